@@ -1,0 +1,1 @@
+"""Swarm state to tactile pattern to glove."""

@@ -1,0 +1,1 @@
+"""The vocabulary every process speaks: messages, topics, codec, bus, configuration, formation, clock."""

@@ -1,0 +1,171 @@
+"""Messages to bytes and back: MessagePack maps, strict on the way in.
+
+cattrs alone would accept NaN, `"1.5"`, `True` as a number or a string as a vector; the hooks here refuse them.
+Unknown extra fields are ignored (a newer publisher may say more), a missing or wrong one is not.
+"""
+
+import enum
+import math
+from collections.abc import Callable
+from typing import Annotated, Any, TypeVar, get_args, get_origin
+
+import msgpack
+from cattrs import Converter
+
+from shared.errors import DecodeError
+from shared.messages import SCHEMA_VERSION, Flag, Heard, Message, Mode, Range, Wish
+
+MAX_PAYLOAD = 4096
+"""Largest payload in bytes that is looked at at all."""
+
+M = TypeVar("M", bound=Message)
+Hook = Callable[[Any, Any], Any]
+
+
+def encode(message: Message) -> bytes:
+    """Encodes a message as one MessagePack map with its schema version.
+
+    Args:
+        message: Any of the types in `shared.messages`.
+
+    Returns:
+        The payload; the same message always gives the same bytes.
+    """
+    fields = _converter.unstructure(message)
+    fields["v"] = SCHEMA_VERSION
+    return bytes(msgpack.packb(fields))
+
+
+def decode(payload: bytes, kind: type[M]) -> M:
+    """Decodes and checks one payload.
+
+    Args:
+        payload: Bytes as received, from anyone.
+        kind: The type that the topic promises.
+
+    Returns:
+        The message, every number finite and in range.
+
+    Raises:
+        DecodeError: For whatever is wrong with the payload; nothing else is ever raised.
+    """
+    if len(payload) > MAX_PAYLOAD:
+        raise DecodeError("oversized", f"{len(payload)} bytes, at most {MAX_PAYLOAD}")
+    try:
+        fields = msgpack.unpackb(payload)
+    except Exception as error:
+        raise DecodeError("malformed", type(error).__name__) from error
+    if type(fields) is not dict:
+        raise DecodeError("malformed", f"a map is expected, not {type(fields).__name__}")
+    version = fields.get("v")
+    if type(version) is not int or version != SCHEMA_VERSION:
+        raise DecodeError("version", f"schema {version!r}, this process speaks {SCHEMA_VERSION}")
+    try:
+        return _converter.structure(fields, kind)
+    except DecodeError:
+        raise
+    except KeyError as error:
+        raise DecodeError("missing-field", str(error)) from error
+    except Exception as error:
+        raise DecodeError("wrong-type", f"{type(error).__name__}: {error}") from error
+
+
+def _integer(value: Any, _: Any = int) -> int:
+    if type(value) is not int:
+        raise DecodeError("wrong-type", f"an integer is expected, not {value!r:.40}")
+    return value
+
+
+def _number(value: Any, _: Any = float) -> float:
+    if type(value) is not float and type(value) is not int:
+        raise DecodeError("wrong-type", f"a number is expected, not {value!r:.40}")
+    if not math.isfinite(value):
+        raise DecodeError("non-finite", repr(value))
+    return float(value)
+
+
+def _text(value: Any, _: Any = str) -> str:
+    if type(value) is not str:
+        raise DecodeError("wrong-type", f"a string is expected, not {value!r:.40}")
+    return value
+
+
+def _binary(value: Any, _: Any = bytes) -> bytes:
+    if type(value) is not bytes:
+        raise DecodeError("wrong-type", f"bytes are expected, not {value!r:.40}")
+    return value
+
+
+def _flags(value: Any, kind: type[enum.IntFlag]) -> enum.IntFlag:
+    bits = _integer(value)
+    if bits < 0 or bits > 0xFFFF_FFFF:
+        raise DecodeError("out-of-range", f"flags {bits}")
+    # A newer publisher may set flags that we do not know: keep those that we do.
+    return kind(bits & sum(kind))
+
+
+def _word(value: Any, kind: type[enum.StrEnum]) -> enum.StrEnum:
+    try:
+        return kind(_text(value))
+    except ValueError as error:
+        raise DecodeError("out-of-range", str(error)) from error
+
+
+def _ranged_hook(annotated: Any) -> Hook:
+    """Makes the hook of an `Annotated[number or vector, Range(...)]`."""
+    base, bounds = get_args(annotated)[:2]
+    low, high = bounds
+    scalar = _integer if base is int else _number
+
+    def number(value: Any, _: Any) -> float:
+        checked = scalar(value)
+        if not low <= checked <= high:
+            raise DecodeError("out-of-range", f"{checked!r} not in [{low}, {high}]")
+        return checked
+
+    def vector(value: Any, _: Any) -> tuple[float, ...]:
+        if type(value) is not list or len(value) != 3:
+            raise DecodeError("wrong-type", f"three numbers are expected, not {value!r:.40}")
+        x, y, z = value
+        if (
+            type(x) is type(y) is type(z) is float
+            and low <= x <= high
+            and low <= y <= high
+            and low <= z <= high
+        ):
+            return (x, y, z)
+        return (number(x, float), number(y, float), number(z, float))
+
+    return vector if get_origin(base) is tuple else number
+
+
+def _heard(value: Any, _: Any) -> Heard:
+    if type(value) is not list or len(value) != 3:
+        raise DecodeError("wrong-type", f"(epoch, seq, arrival) is expected, not {value!r:.40}")
+    for number in value:
+        if not 0 <= _integer(number) < 2**64:
+            raise DecodeError("out-of-range", f"heard {number}")
+    return Heard(*value)
+
+
+def _is_ranged(kind: Any) -> bool:
+    return get_origin(kind) is Annotated and isinstance(get_args(kind)[1], Range)
+
+
+def _make_converter() -> Converter:
+    converter = Converter(detailed_validation=False)
+    converter.register_structure_hook(int, _integer)
+    converter.register_structure_hook(float, _number)
+    converter.register_structure_hook(str, _text)
+    converter.register_structure_hook(bytes, _binary)
+    converter.register_structure_hook_factory(_is_ranged, _ranged_hook)
+    converter.register_structure_hook_func(lambda kind: kind is Heard, _heard)
+    # By class, because a hook for `str` or `int` would also take their subclasses and leave a bare string.
+    converter.register_structure_hook(Flag, _flags)
+    for word in (Wish, Mode):
+        converter.register_structure_hook(word, _word)
+    converter.register_unstructure_hook(Heard, list)
+    return converter
+
+
+_converter = _make_converter()

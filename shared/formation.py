@@ -1,0 +1,276 @@
+"""The formation as matrices: reference weights, offsets, links, order and rest shape (DESIGN section 4).
+
+A formation is a matrix with rows >= 0 and sum 1 over `[human, drone 1, ..., drone N]`; one agent is one row.
+The reference graph must be a DAG rooted at the human.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from attrs import field, frozen
+
+from shared.errors import ConfigError
+from shared.scenario import Drone, Impedance, Scenario
+from shared.shapes import HUMAN, generate
+
+Vec = npt.NDArray[np.float64]
+
+PAPER_MAX_DEPTH = 4
+"""The `paper` law is string-unstable: each hop adds lag and gain (PAPER.md)."""
+
+
+@frozen(kw_only=True)
+class Link:
+    """One impedance link into a drone.
+
+    Attributes:
+        name: `"from-to"`, with `human` or numbers of drones.
+        source: Row of the origin in `[human, drones...]`.
+        target: Row of the drone in `[drones...]`.
+        mass: M, kg.
+        damping: D, N s/m.
+        stiffness: K, N/m.
+        gain: Kv, N s/m.
+        limit: Bound of the displacement per axis, m.
+    """
+
+    name: str
+    source: int
+    target: int
+    mass: float
+    damping: float
+    stiffness: float
+    gain: float
+    limit: float
+
+
+@frozen(kw_only=True)
+class Formation:
+    """A checked formation of N drones.
+
+    Attributes:
+        ids: Numbers of the drones, ascending, length N.
+        weights: (N, N + 1) reference weights over `[human, drones...]`, rows sum to 1.
+        offsets: (N, 3) place relative to the weighted references, formation frame, m.
+        links: Every impedance link.
+        levels: Rows of the drones by depth: all references of a level are in earlier ones.
+        depth: Number of levels.
+        rest: (N, 3) rest shape relative to the mapped hand, formation frame, m.
+        correction_scale: Factor on every correction (1 for the paper's law).
+    """
+
+    ids: tuple[int, ...]
+    weights: Vec = field(eq=False)
+    offsets: Vec = field(eq=False)
+    links: tuple[Link, ...]
+    levels: tuple[tuple[int, ...], ...]
+    rest: Vec = field(eq=False)
+    correction_scale: float
+
+    @property
+    def depth(self) -> int:
+        """Hops from the human to the deepest drone."""
+        return len(self.levels)
+
+    def row(self, drone: int) -> int:
+        """Returns the row of a drone by its number."""
+        return self.ids.index(drone)
+
+    def references(self, drone: int) -> tuple[int, ...]:
+        """Returns the numbers of the drones that one refers to directly (the human is not among them)."""
+        row = self.weights[self.row(drone), 1:]
+        return tuple(self.ids[column] for column in np.flatnonzero(row))
+
+    def refers_to_human(self, drone: int) -> bool:
+        """Says whether a drone refers to the human directly."""
+        return bool(self.weights[self.row(drone), 0] > 0)
+
+    def ancestors(self, drone: int) -> tuple[int, ...]:
+        """Returns the numbers of all drones that one depends on, however indirectly."""
+        found: set[int] = set()
+        pending = list(self.references(drone))
+        while pending:
+            ancestor = pending.pop()
+            if ancestor not in found:
+                found.add(ancestor)
+                pending.extend(self.references(ancestor))
+        return tuple(sorted(found))
+
+    def links_into(self, drone: int) -> tuple[Link, ...]:
+        """Returns the impedance links into one drone."""
+        row = self.row(drone)
+        return tuple(link for link in self.links if link.target == row)
+
+    @property
+    def radius(self) -> float:
+        """Horizontal distance of the outermost drone from the mapped hand at rest, m."""
+        return float(np.linalg.norm(self.rest[:, :2], axis=1).max())
+
+
+def build_formation(scenario: Scenario, origin: str = "scenario") -> Formation:
+    """Builds and checks the formation of a scenario.
+
+    Args:
+        scenario: The scenario.
+        origin: File it is from, for messages.
+
+    Returns:
+        The formation.
+
+    Raises:
+        ConfigError: Double ids, unknown references, a cycle, no path to the human, wrong weights, a `paper`
+            law that is too deep, or two drones nearer than the safety distance at rest.
+    """
+    drones = sorted(generate(scenario.formation), key=lambda drone: drone.id)
+    where = f"{origin}: at key formation"
+    _check_ids(drones, scenario, where)
+    ids = tuple(drone.id for drone in drones)
+    weights = np.array([_weight_row(drone, ids, where) for drone in drones])
+    offsets = np.array([drone.offset for drone in drones], dtype=np.float64)
+    levels = _levels(weights, ids, where)
+    if scenario.swarm.law == "paper" and len(levels) > PAPER_MAX_DEPTH:
+        raise ConfigError(
+            f"{where}: the formation is {len(levels)} hops deep; the paper's law is string-unstable and"
+            f' flies at most {PAPER_MAX_DEPTH}. Use swarm.law = "stable", or a flatter shape'
+        )
+    rest = _rest_shape(weights, offsets, levels)
+    _check_distances(rest, ids, scenario.limits.safety_distance, where)
+    links = _build_links(scenario, drones, ids, where)
+    return Formation(
+        ids=ids,
+        weights=weights,
+        offsets=offsets,
+        links=links,
+        levels=levels,
+        rest=rest,
+        correction_scale=_correction_scale(scenario, links, weights, levels),
+    )
+
+
+def _check_ids(drones: Sequence[Drone], scenario: Scenario, where: str) -> None:
+    ids = [drone.id for drone in drones]
+    if not ids:
+        raise ConfigError(f"{where}.drones: no drones; list [[formation.drones]] or choose a shape")
+    for number in ids:
+        if ids.count(number) > 1:
+            raise ConfigError(f"{where}.drones: id {number} appears {ids.count(number)} times; ids are unique")
+    for robot in scenario.vehicles.robots:
+        if robot not in map(str, ids):
+            raise ConfigError(f"{where}: vehicles.robots.{robot} names no drone of the formation {ids}")
+
+
+def _weight_row(drone: Drone, ids: tuple[int, ...], where: str) -> Vec:
+    where = f"{where}.drones, drone {drone.id}"
+    if not drone.references:
+        raise ConfigError(f'{where}: no references; refer to "human" or to another drone')
+    weights = drone.weights or (1.0 / len(drone.references),) * len(drone.references)
+    if len(weights) != len(drone.references) or min(weights) < 0 or abs(sum(weights) - 1.0) > 1e-9:
+        raise ConfigError(f"{where}: weights {weights} must be >= 0, one per reference, with sum 1")
+    row = np.zeros(len(ids) + 1)
+    for reference, weight in zip(drone.references, weights, strict=True):
+        row[_column(reference, ids, where)] += weight
+    return row
+
+
+def _column(reference: str, ids: tuple[int, ...], where: str) -> int:
+    """Returns the column of a reference in `[human, drones...]`."""
+    if reference == HUMAN:
+        return 0
+    if reference.isdecimal() and int(reference) in ids:
+        return 1 + ids.index(int(reference))
+    raise ConfigError(f'{where}: {reference!r} is neither "human" nor a drone of {list(ids)}')
+
+
+def _levels(weights: Vec, ids: tuple[int, ...], where: str) -> tuple[tuple[int, ...], ...]:
+    """Sorts the rows by depth (Kahn); whatever never becomes ready is in, or behind, a cycle."""
+    levels: list[tuple[int, ...]] = []
+    placed: set[int] = set()
+    waiting = set(range(len(ids)))
+    while waiting:
+        ready = tuple(sorted(row for row in waiting if set(np.flatnonzero(weights[row, 1:])) <= placed))
+        if not ready:
+            stuck = sorted(ids[row] for row in waiting)
+            raise ConfigError(
+                f"{where}.drones: drones {stuck} form a cycle or have no path to the human except through one."
+                " Let one of them refer only to the human or to drones outside the cycle"
+            )
+        levels.append(ready)
+        placed |= set(ready)
+        waiting -= set(ready)
+    return tuple(levels)
+
+
+def _rest_shape(weights: Vec, offsets: Vec, levels: tuple[tuple[int, ...], ...]) -> Vec:
+    positions = np.zeros((len(offsets) + 1, 3))
+    for level in levels:
+        for row in level:
+            positions[row + 1] = weights[row] @ positions + offsets[row]
+    return positions[1:]
+
+
+def _check_distances(rest: Vec, ids: tuple[int, ...], smallest: float, where: str) -> None:
+    gaps = np.linalg.norm(rest[:, None, :2] - rest[None, :, :2], axis=2)
+    np.fill_diagonal(gaps, np.inf)
+    first, second = np.unravel_index(np.argmin(gaps), gaps.shape)
+    if gaps[first, second] < smallest:
+        raise ConfigError(
+            f"{where}: drones {ids[first]} and {ids[second]} rest {gaps[first, second]:.3f} m apart, nearer"
+            f" than limits.safety_distance = {smallest} m; widen spacing, width or their offsets"
+        )
+
+
+def _build_links(
+    scenario: Scenario, drones: Sequence[Drone], ids: tuple[int, ...], where: str
+) -> tuple[Link, ...]:
+    names = scenario.formation.links
+    if names is None:
+        names = tuple(f"{reference}-{drone.id}" for drone in drones for reference in drone.references)
+    special = {settings.name: settings for settings in scenario.impedance.links}
+    for name in special:
+        if name not in names:
+            raise ConfigError(f"{where}: impedance.links names {name!r}, the links are {list(names)}")
+    return tuple(_build_link(name, scenario.impedance, special.get(name), ids, where) for name in names)
+
+
+def _build_link(name: str, default: Impedance, special: object, ids: tuple[int, ...], where: str) -> Link:
+    source, separator, target = name.partition("-")
+    where = f"{where}.links, {name!r}"
+    if not separator or target == HUMAN:
+        raise ConfigError(f'{where}: a link is "from-to" with a drone at its end, for example "human-1"')
+
+    def value(key: str) -> float:
+        chosen = getattr(special, key, None)
+        return float(getattr(default, key) if chosen is None else chosen)
+
+    link = Link(
+        name=name,
+        source=_column(source, ids, where),
+        target=_column(target, ids, where) - 1,
+        mass=value("mass"),
+        damping=value("damping"),
+        stiffness=value("stiffness"),
+        gain=value("gain"),
+        limit=value("limit"),
+    )
+    if link.mass <= 0 or link.stiffness <= 0 or link.damping < 0 or link.limit <= 0:
+        raise ConfigError(f"{where}: mass, stiffness and limit must be > 0, damping >= 0 ({link})")
+    return link
+
+
+def _correction_scale(
+    scenario: Scenario, links: tuple[Link, ...], weights: Vec, levels: tuple[tuple[int, ...], ...]
+) -> float:
+    """Bounds the sum of corrections along the deepest path by `total_limit` (`stable` law only)."""
+    if scenario.swarm.law == "paper":
+        return 1.0
+    own = np.zeros(len(weights))
+    for link in links:
+        own[link.target] += link.limit if link.gain else 0.0
+    total = np.zeros(len(weights))
+    for level in levels:
+        for row in level:
+            parents = np.flatnonzero(weights[row, 1:])
+            total[row] = own[row] + max((total[parent] for parent in parents), default=0.0)
+    worst = float(total.max())
+    return min(1.0, scenario.swarm.total_limit / worst) if worst > 0 else 1.0

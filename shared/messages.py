@@ -1,0 +1,224 @@
+"""What travels between the processes: frozen types, SI units, world frame ENU (z up).
+
+Every message carries an envelope: `epoch` (the publisher's start, ns; a restarted process gets a new one),
+`seq` (from 0 within an epoch) and `stamp_ns` (the publisher's clock). Order and loss are judged by
+`(epoch, seq)` alone. The schema version `v` is added and checked by `shared.codec`.
+"""
+
+import enum
+from typing import Annotated, NamedTuple
+
+from attrs import Factory, field, frozen
+
+SCHEMA_VERSION = 1
+
+MAX_POSITION = 1_000.0
+MAX_VELOCITY = 50.0
+
+
+class Range(NamedTuple):
+    """Closed interval that a decoded number (or every element of a vector) must lie in."""
+
+    low: float
+    high: float
+
+
+Vector = tuple[float, float, float]
+Position = Annotated[Vector, Range(-MAX_POSITION, MAX_POSITION)]
+Velocity = Annotated[Vector, Range(-MAX_VELOCITY, MAX_VELOCITY)]
+Angle = Annotated[float, Range(-1_000.0, 1_000.0)]
+Seconds = Annotated[float, Range(0.0, 1e9)]
+Fraction = Annotated[float, Range(0.0, 1.0)]
+UInt64 = Annotated[int, Range(0, 2**64 - 1)]
+DroneId = Annotated[int, Range(1, 65_535)]
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+NO_HAND: Vector = (0.0, 0.0, -MAX_POSITION)
+"""Position in hand samples while the relay has not seen a hand yet; nobody keeps away from it or follows it."""
+
+
+class Wish(enum.StrEnum):
+    """What the operator wants; repeated in every hand sample, so nothing is lost without a return path."""
+
+    GROUND = "GROUND"
+    FLY = "FLY"
+    HOLD = "HOLD"
+    LAND = "LAND"
+    STOP = "STOP"
+
+
+class Mode(enum.StrEnum):
+    """Flight mode of one drone (DESIGN section 5)."""
+
+    GROUND = "GROUND"
+    TAKEOFF = "TAKEOFF"
+    FOLLOW = "FOLLOW"
+    HOLD = "HOLD"
+    LAND = "LAND"
+    STOP = "STOP"
+
+
+class Flag(enum.IntFlag):
+    """Conditions of a drone that the operator may have to feel."""
+
+    EXTRAPOLATING = 1
+    REPAIRED = 2
+    BLOCKED = 4
+    FENCE = 8
+    LOW_BATTERY = 16
+    CRITICAL_BATTERY = 32
+    OLD_POSE = 64
+    HAND_STALE = 128
+    REFERENCE_LOST = 256
+    REJECTED_INPUT = 512
+    AVOIDING = 1024
+
+
+class Heard(NamedTuple):
+    """Which sample of a topic a step used, and when it had arrived (receiver's clock)."""
+
+    epoch: UInt64
+    seq: UInt64
+    arrival_ns: UInt64
+
+
+NO_FLAGS = Flag(0)
+
+
+@frozen(kw_only=True)
+class Message:
+    """Envelope of every message."""
+
+    epoch: UInt64
+    seq: UInt64
+    stamp_ns: UInt64
+
+
+@frozen(kw_only=True)
+class HandSample(Message):
+    """The hand and the operator's wish; the wish is state, repeated in every sample.
+
+    Attributes:
+        position: Hand in the world frame, m; `NO_HAND` before the first.
+        velocity: Hand in the world frame, m/s.
+        yaw: Heading of the hand about z, rad.
+        mode: The operator's wish.
+        signature: Ed25519 signature over key, epoch, seq and payload; None where the swarm has no key.
+    """
+
+    position: Position
+    velocity: Velocity
+    yaw: Angle
+    mode: Wish
+    signature: bytes | None = None
+
+
+@frozen(kw_only=True)
+class DroneState(Message):
+    """One control step of one drone.
+
+    Attributes:
+        id: Number of the drone in the scenario.
+        position: Body in the world frame, m, as the vehicle last reported it.
+        velocity: Body in the world frame, m/s.
+        goal: Where the control law wants the drone (before avoidance), m.
+        goal_velocity: Rate of the goal from the broadcast hand velocity and the link rates, m/s.
+        setpoint: What was sent to the vehicle (after avoidance and limits), m.
+        mode: Flight mode.
+        displacements: Impedance displacement per link into this drone, `"1-2"` -> metres, before its limit.
+        pose_age: Age of the vehicle's pose when it was used, s.
+        battery: Charge, 0..1.
+        flags: Conditions, see `Flag`.
+        heard: The inputs this step used: key -> (epoch, seq, arrival).
+        step_ns: When the step started (publisher's clock, same as `stamp_ns` and `arrival_ns`).
+    """
+
+    id: DroneId
+    position: Position
+    velocity: Velocity
+    goal: Position
+    goal_velocity: Velocity
+    setpoint: Position
+    mode: Mode
+    displacements: dict[str, Position] = Factory(dict)
+    pose_age: Seconds = 0.0
+    battery: Fraction = 1.0
+    flags: Flag = NO_FLAGS
+    heard: dict[str, Heard] = Factory(dict)
+    step_ns: UInt64 = 0
+
+
+@frozen(kw_only=True)
+class FormationState(Message):
+    """State of the formation as the operator is to feel it (paper section 5.2).
+
+    Attributes:
+        area: Area of the polygon of the drones, m^2.
+        area_ratio: Area over the area of the default formation.
+        distances: Distance per neighbouring pair, `"1-2"` -> metres.
+        extent: -1 contracted, 0 regular, +1 extended.
+        trend: -1 shrinking, 0 steady, +1 growing.
+        displacement: Shift of the centroid to the right of the direction of motion, m.
+        missing: Drones that are not heard.
+        heard: The inputs it was computed from.
+    """
+
+    area: Seconds
+    area_ratio: Seconds
+    distances: dict[str, Seconds]
+    extent: Annotated[int, Range(-1, 1)]
+    trend: Annotated[int, Range(-1, 1)]
+    displacement: Annotated[float, Range(-MAX_POSITION, MAX_POSITION)]
+    missing: tuple[DroneId, ...] = ()
+    heard: dict[str, Heard] = Factory(dict)
+
+
+@frozen(kw_only=True)
+class PatternEvent(Message):
+    """A tactile pattern: why, what, and how it went on the device.
+
+    Attributes:
+        pattern: Name in the pattern set.
+        outcome: `started`, `finished`, `suppressed` or `failed`.
+        state_seq: `seq` of the `FormationState` that caused it.
+        heard: The drone and hand samples that caused it.
+        started_ns: When the first frame started, 0 if it did not.
+        finished_ns: When the device reported the end, 0 if it did not.
+    """
+
+    pattern: str
+    outcome: str
+    state_seq: UInt64
+    heard: dict[str, Heard] = Factory(dict)
+    started_ns: UInt64 = 0
+    finished_ns: UInt64 = 0
+
+
+@frozen(kw_only=True)
+class ProcessStatus(Message):
+    """Health of one process, once a second and once more when it ends.
+
+    Attributes:
+        role: `drone`, `relay`, `world`, `bridge`, `observer`.
+        id: Number within the role, 0 for single ones.
+        pid: Process number on its host.
+        host: Name of its machine.
+        state: One word: `starting`, `running`, `degraded`, `ending`.
+        rate_hz: Steps per second over the last second.
+        cpu: Fraction of one core over the last second.
+        rss_mb: Resident memory, MB.
+        rejected: Dropped messages by reason since the start.
+        metrics: Further numbers of this role (for example the referee's distances).
+    """
+
+    role: str
+    id: Annotated[int, Range(0, 65_535)]
+    pid: UInt64
+    host: str
+    state: str
+    rate_hz: Seconds = 0.0
+    cpu: Seconds = 0.0
+    rss_mb: Seconds = 0.0
+    rejected: dict[str, UInt64] = field(factory=dict)
+    metrics: dict[str, float] = field(factory=dict)

@@ -1,0 +1,64 @@
+"""Who dials whom: every node of a swarm, its endpoint, and the static links between them (DESIGN section 3).
+
+Order matters: of two nodes that need each other the later one in `all_nodes` dials, so no pair links twice.
+"""
+
+import numpy as np
+
+from shared.formation import Formation
+from shared.scenario import Scenario
+
+RELAY = "relay"
+WORLD = "world"
+BRIDGE = "bridge"
+OBSERVER = "observer"
+
+NEAR = 1.5
+"""Drones that rest within this distance link to each other, m."""
+FULL_MESH = 16
+"""Up to this many drones everyone links to everyone."""
+
+
+def drone_node(drone: int) -> str:
+    """Returns the node name of a drone."""
+    return f"drone/{drone}"
+
+
+def all_nodes(formation: Formation) -> tuple[str, ...]:
+    """Returns every node of the swarm in dialling order."""
+    return (RELAY, *(drone_node(i) for i in formation.ids), WORLD, BRIDGE, OBSERVER)
+
+
+def endpoint(scenario: Scenario, formation: Formation, node: str) -> str:
+    """Returns the endpoint that a node listens on.
+
+    It is the scenario's `net.endpoints` entry, or else a port on loopback counted from `net.base_port`.
+    """
+    default = f"tcp/127.0.0.1:{scenario.net.base_port + all_nodes(formation).index(node)}"
+    return scenario.net.endpoints.get(node, default)
+
+
+def dials(scenario: Scenario, formation: Formation, node: str) -> list[str]:
+    """Returns the endpoints that a node dials."""
+    nodes = all_nodes(formation)
+    earlier = nodes[: nodes.index(node)]
+    return [endpoint(scenario, formation, other) for other in earlier if _linked(formation, node, other)]
+
+
+def neighbours(formation: Formation, drone: int) -> tuple[int, ...]:
+    """Returns the drones that one hears: all of a small swarm, else its ancestors and those near it."""
+    if len(formation.ids) <= FULL_MESH:
+        return tuple(other for other in formation.ids if other != drone)
+    gaps = np.linalg.norm(formation.rest - formation.rest[formation.row(drone)], axis=1)
+    near = {other for other, gap in zip(formation.ids, gaps, strict=True) if gap <= NEAR}
+    return tuple(sorted((near | set(formation.ancestors(drone))) - {drone}))
+
+
+def _linked(formation: Formation, node: str, earlier: str) -> bool:
+    if WORLD in (node, earlier):
+        # The world stands for physics, not for a member: it hears the hand (as the referee) and is observed.
+        return RELAY in (node, earlier) or OBSERVER in (node, earlier)
+    if not (node.startswith("drone/") and earlier.startswith("drone/")):
+        return True
+    one, other = int(node.removeprefix("drone/")), int(earlier.removeprefix("drone/"))
+    return other in neighbours(formation, one) or one in neighbours(formation, other)

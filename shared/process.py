@@ -1,0 +1,154 @@
+"""What every process of the swarm does alike: end on signals, log, share its health, die with its launcher."""
+
+import ctypes
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+from shared.clock import NS_PER_S, Clock
+from shared.codec import encode
+from shared.messages import ProcessStatus
+from shared.topics import STATUS
+from shared.transport import Bus
+
+LAUNCHER_PID = "SWARMTOUCH_LAUNCHER_PID"
+"""Environment variable by which a launcher asks its children to die with it."""
+
+_PR_SET_PDEATHSIG = 1
+_SWITCH_INTERVAL_S = 0.0005
+_STATUS_PERIOD_NS = NS_PER_S
+
+
+def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
+    """Sets a process up: logging to stderr, signals, GIL hand-over, death with the launcher.
+
+    Args:
+        name: Name for its log lines.
+        verbose: Whether to log debugging details.
+
+    Returns:
+        An event that SIGTERM or SIGINT sets; the loop ends when it is set.
+    """
+    logging.basicConfig(
+        level=logging.DEBUG if verbose else logging.INFO,
+        format=f"%(asctime)s.%(msecs)03d {name} %(levelname)s %(name)s: %(message)s",
+        datefmt="%H:%M:%S",
+    )
+    # The default of 5 ms would let a busy thread delay every received sample by as much.
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
+    stopping = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stopping.set())
+    launcher = os.environ.get(LAUNCHER_PID)
+    if launcher:
+        _die_with(int(launcher))
+    return stopping
+
+
+class ResourceMeter:
+    """Measures the CPU and memory use of this process."""
+
+    def __init__(self) -> None:
+        self._cpu = time.process_time()
+        self._wall = time.monotonic()
+
+    def read(self) -> tuple[float, float]:
+        """Returns the fraction of one core used since the last call, and the resident memory in MB."""
+        cpu, wall = time.process_time(), time.monotonic()
+        fraction = (cpu - self._cpu) / max(wall - self._wall, 1e-6)
+        self._cpu, self._wall = cpu, wall
+        return fraction, _resident_mb()
+
+
+class StatusReporter:
+    """Publishes a `ProcessStatus` once a second, and whenever it is told to.
+
+    Args:
+        bus: Where to publish.
+        role: Role of this process.
+        number: Number within the role.
+        clock: The process's clock.
+    """
+
+    def __init__(self, bus: Bus, role: str, number: int, clock: Clock) -> None:
+        self._publish = bus.publisher(STATUS, role=role, id=number)
+        self._role, self._number, self._clock = role, number, clock
+        self._epoch = clock()
+        self._seq = 0
+        self._due_ns = self._last_ns = self._epoch
+        self._steps = 0
+        self._meter = ResourceMeter()
+        bus.announce(role, number)
+
+    def tick(
+        self,
+        steps: int,
+        state: str = "running",
+        rejected: dict[str, int] | None = None,
+        metrics: Callable[[], dict[str, float]] = dict,
+        *,
+        force: bool = False,
+    ) -> None:
+        """Publishes if a second has passed.
+
+        Args:
+            steps: Loop steps since the start.
+            state: One word on how it goes.
+            rejected: Dropped messages by reason since the start.
+            metrics: Called for further numbers, only when it is time.
+            force: Publish now.
+        """
+        now = self._clock()
+        if now < self._due_ns and not force:
+            return
+        self._due_ns = now + _STATUS_PERIOD_NS
+        cpu, rss_mb = self._meter.read()
+        elapsed = max((now - self._last_ns) / NS_PER_S, 1e-6)
+        status = ProcessStatus(
+            epoch=self._epoch,
+            seq=self._seq,
+            stamp_ns=now,
+            role=self._role,
+            id=self._number,
+            pid=os.getpid(),
+            host=socket.gethostname(),
+            state=state,
+            rate_hz=(steps - self._steps) / elapsed,
+            cpu=cpu,
+            rss_mb=rss_mb,
+            rejected=dict(rejected or {}),
+            metrics=metrics(),
+        )
+        self._publish(encode(status))
+        self._seq += 1
+        self._last_ns, self._steps = now, steps
+
+
+def _die_with(launcher: int) -> None:
+    """Makes the kernel kill this process when the launcher dies, however that happens."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    else:
+        threading.Thread(target=_watch_parent, args=(launcher,), daemon=True).start()
+    if os.getppid() != launcher:  # it died before the request took effect
+        os._exit(1)
+
+
+def _watch_parent(launcher: int) -> None:
+    while os.getppid() == launcher:
+        time.sleep(0.5)
+    os._exit(1)
+
+
+def _resident_mb() -> float:
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            pages = int(file.read().split()[1])
+    except OSError:
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

@@ -1,0 +1,308 @@
+"""What a scenario may say: one frozen class per TOML table, with its defaults and single-value checks."""
+
+from typing import Any, Literal
+
+from attrs import Attribute, Factory, field, frozen
+
+Law = Literal["paper", "stable"]
+Shape = Literal["rhombus", "triangle", "line", "vee", "grid", "custom"]
+
+
+def _positive(_: Any, attribute: "Attribute[Any]", value: float) -> None:
+    if not value > 0:
+        raise ValueError(f"{attribute.name} must be > 0, not {value!r}")
+
+
+def _not_negative(_: Any, attribute: "Attribute[Any]", value: float) -> None:
+    if not value >= 0:
+        raise ValueError(f"{attribute.name} must be >= 0, not {value!r}")
+
+
+def _key_chunk(_: Any, attribute: "Attribute[Any]", value: str) -> None:
+    if not value or not all(c.isalnum() or c in "-_" for c in value):
+        raise ValueError(
+            f"{attribute.name} must be letters, digits, - or _ (it becomes a key prefix), not {value!r}"
+        )
+
+
+Triple = tuple[float, float, float]
+Pair = tuple[float, float]
+
+
+@frozen(kw_only=True)
+class Swarm:
+    """`[swarm]`: who it is and by which law it flies.
+
+    Attributes:
+        name: Prefix of every key; swarms of other names do not hear this one.
+        law: `paper` (references are actual positions, Eqs. 11-13) or `stable` (references are goals).
+        total_limit: `stable`: bound of the summed corrections along the deepest path, m.
+    """
+
+    name: str = field(default="swarm", validator=_key_chunk)
+    law: Law = "stable"
+    total_limit: float = field(default=0.5, validator=_positive)
+
+
+@frozen(kw_only=True)
+class Rates:
+    """`[rates]`: Hz."""
+
+    control_hz: float = field(default=60.0, validator=_positive)
+    max_control_hz: float = field(default=120.0, validator=_positive)
+    hand_hz: float = field(default=60.0, validator=_positive)
+
+
+@frozen(kw_only=True)
+class Clip:
+    """`[hand.clip]`: box that the mapped hand is clipped to, m (x, y)."""
+
+    min: Pair
+    max: Pair
+
+
+@frozen(kw_only=True)
+class Hand:
+    """`[hand]`: from the hand in the world to the point that the formation refers to.
+
+    Attributes:
+        mapping: `absolute` (the hand itself) or `relative` (`offset + gain * hand`).
+        gain: Factor of `relative`, also on the velocity.
+        offset: Shift of `relative`, m.
+        height: Fixed height of the mapped hand, m; absent: it follows the hand.
+        home: Mapped hand (x, y) at which the formation is laid out on the ground, m.
+        clip: Box for the mapped hand, absent: only the fence.
+        follow_yaw: Whether the formation turns with the hand's yaw.
+        max_speed: The mapped hand follows no faster than this, m/s.
+    """
+
+    mapping: Literal["absolute", "relative"] = "absolute"
+    gain: float = field(default=1.0, validator=_positive)
+    offset: Triple = (0.0, 0.0, 0.0)
+    height: float | None = None
+    home: Pair = (0.0, 0.0)
+    clip: Clip | None = None
+    follow_yaw: bool = True
+    max_speed: float = field(default=0.75, validator=_positive)
+
+
+@frozen(kw_only=True)
+class LinkSettings:
+    """One entry of `[[impedance.links]]`: what differs for one link from the default."""
+
+    name: str
+    mass: float | None = None
+    damping: float | None = None
+    stiffness: float | None = None
+    gain: float | None = None
+    limit: float | None = None
+
+
+@frozen(kw_only=True)
+class Impedance:
+    """`[impedance]`: the mass-spring-damper of every link, `M x'' + D x' + K x = Kv v_hand`.
+
+    Attributes:
+        mass: M, kg.
+        damping: D, N s/m.
+        stiffness: K, N/m.
+        gain: Kv, N s/m; 0 switches the links off.
+        limit: Bound of each displacement and axis, m.
+        links: Exceptions by link name, for example `"2-4"`.
+    """
+
+    mass: float = field(default=1.9, validator=_positive)
+    damping: float = field(default=12.6, validator=_not_negative)
+    stiffness: float = field(default=21.0, validator=_positive)
+    gain: float = -7.0
+    limit: float = field(default=0.25, validator=_positive)
+    links: tuple[LinkSettings, ...] = ()
+
+
+@frozen(kw_only=True)
+class Drone:
+    """One entry of `[[formation.drones]]`: the geometry of one drone.
+
+    Attributes:
+        id: Number of the drone, from 1.
+        references: `"human"` or numbers of drones.
+        weights: Weight per reference, sum 1; absent: equal.
+        offset: Place relative to the weighted references, formation frame, m.
+    """
+
+    id: int = field(validator=_positive)
+    references: tuple[str, ...]
+    weights: tuple[float, ...] | None = None
+    offset: Triple = (0.0, 0.0, 0.0)
+
+
+@frozen(kw_only=True)
+class FormationSettings:
+    """`[formation]`: geometry and impedance links, independently of each other.
+
+    Attributes:
+        shape: A generator, or `custom` with `drones`.
+        n: Number of drones of a generated shape.
+        spacing: Distance along the direction of motion (L), m.
+        width: Distance across (H), m.
+        columns: `grid`: drones per row; absent: near square.
+        drones: The geometry of `custom`.
+        links: Impedance links `"from-to"`; absent: one per reference. `[]` means none.
+        height_from: `paper` law: `hand` takes the height of a reference from the hand and the rest shape, as
+            the recorded flights did; `references` takes its actual height, literally Eqs. 11-13, and lets the
+            slow altitude loop of every drone ring through the whole formation.
+    """
+
+    shape: Shape = "rhombus"
+    n: int = field(default=4, validator=_positive)
+    spacing: float = field(default=0.5, validator=_positive)
+    width: float = field(default=0.5, validator=_positive)
+    columns: int | None = None
+    drones: tuple[Drone, ...] = ()
+    links: tuple[str, ...] | None = None
+    height_from: Literal["hand", "references"] = "hand"
+
+
+@frozen(kw_only=True)
+class Obstacle:
+    """One entry of `[[obstacles]]`: a vertical column."""
+
+    name: str
+    x: float
+    y: float
+
+
+@frozen(kw_only=True)
+class FieldSettings:
+    """Potential field of one kind of obstacle (Eqs. 14-16).
+
+    Attributes:
+        eta: Gain of the repulsion, m^4/s.
+        d0: Distance from the surface at which it starts, m.
+        radius: Radius of the obstacle, m.
+    """
+
+    eta: float = field(validator=_positive)
+    d0: float = field(validator=_positive)
+    radius: float = field(validator=_positive)
+
+
+@frozen(kw_only=True)
+class Avoidance:
+    """`[avoidance]`: columns by field or projection; separation from drones and hand always on.
+
+    Attributes:
+        rule: `field` (Eqs. 14-16) or `projection` (the flights' rule, swept, with a margin).
+        xi: Gain of the attraction, 1/s.
+        speed: Largest set-point speed while a column acts, m/s.
+        columns: Field of the columns.
+        separation: Field of other drones and of the hand.
+        projection_radius: Circle of `projection`, m.
+        projection_margin: Added to it in flight, m.
+    """
+
+    rule: Literal["field", "projection"] = "field"
+    xi: float = field(default=2.0, validator=_positive)
+    speed: float = field(default=0.5, validator=_positive)
+    columns: FieldSettings = FieldSettings(eta=0.002, d0=0.30, radius=0.12)
+    separation: FieldSettings = FieldSettings(eta=2e-4, d0=0.12, radius=0.18)
+    projection_radius: float = field(default=0.27, validator=_positive)
+    projection_margin: float = field(default=0.06, validator=_not_negative)
+
+
+@frozen(kw_only=True)
+class VehicleSettings:
+    """Settings of a vehicle; absent ones come from the next wider table (robot > type > all).
+
+    Attributes:
+        type: Name of a table under `[vehicles.types]`.
+        uri: Backend, `{id}` is replaced by the drone's number.
+        body: Simulated body: `identified` or `crazyflie`.
+        link_loss: What a simulated body does without commands: `crazyflie` or `hover`.
+        tau: Lag of the vehicle that the `stable` law leads by, s.
+    """
+
+    type: str | None = None
+    uri: str | None = None
+    body: Literal["identified", "crazyflie"] | None = None
+    link_loss: Literal["crazyflie", "hover"] | None = None
+    tau: float | None = None
+
+
+@frozen(kw_only=True)
+class Vehicles:
+    """`[vehicles]`: robot > type > all."""
+
+    all: VehicleSettings = VehicleSettings()
+    types: dict[str, VehicleSettings] = Factory(dict)
+    robots: dict[str, VehicleSettings] = Factory(dict)
+
+
+@frozen(kw_only=True)
+class Limits:
+    """`[limits]`: bounds of what a vehicle is ever asked to do.
+
+    Attributes:
+        speed: Set-point speed, m/s (1.5 x the hand's speed if that is larger).
+        acceleration: Set-point acceleration, m/s^2.
+        safety_distance: Smallest distance of two drones in the rest shape, m.
+        takeoff_height: Height at which a drone joins the formation, m.
+        takeoff_speed: Climb rate, m/s.
+        landing_speed: Descent rate, m/s.
+    """
+
+    speed: float = field(default=1.0, validator=_positive)
+    acceleration: float = field(default=3.0, validator=_positive)
+    safety_distance: float = field(default=0.30, validator=_positive)
+    takeoff_height: float = field(default=1.2, validator=_positive)
+    takeoff_speed: float = field(default=0.5, validator=_positive)
+    landing_speed: float = field(default=0.5, validator=_positive)
+
+
+@frozen(kw_only=True)
+class Fence:
+    """`[fence]`: box that no drone leaves.
+
+    Attributes:
+        min: Lower corner, m; absent: the formation at home less `room`.
+        max: Upper corner, m; absent: the formation at home plus `room`.
+        room: Free space around the formation where a corner is absent, m.
+        margin: Free space between goals and the box, m.
+    """
+
+    min: Triple | None = None
+    max: Triple | None = None
+    room: float = field(default=3.0, validator=_positive)
+    margin: float = field(default=0.15, validator=_not_negative)
+
+
+@frozen(kw_only=True)
+class Net:
+    """`[net]`: where the processes meet.
+
+    Attributes:
+        base_port: First port on loopback of nodes without an endpoint.
+        endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "tcp/10.0.0.2:7447"`.
+        adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
+    """
+
+    base_port: int = field(default=7460, validator=_positive)
+    endpoints: dict[str, str] = Factory(dict)
+    adminspace: bool = False
+
+
+@frozen(kw_only=True)
+class Scenario:
+    """A whole scenario file."""
+
+    swarm: Swarm = Swarm()
+    rates: Rates = Rates()
+    hand: Hand = Hand()
+    impedance: Impedance = Impedance()
+    formation: FormationSettings = FormationSettings()
+    obstacles: tuple[Obstacle, ...] = ()
+    avoidance: Avoidance = Avoidance()
+    vehicles: Vehicles = Vehicles()
+    limits: Limits = Limits()
+    fence: Fence = Fence()
+    net: Net = Net()

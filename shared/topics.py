@@ -1,0 +1,83 @@
+"""The one table of topics: rates, staleness and delivery all derive from these rows (DESIGN section 3).
+
+Keys live under the swarm's name (the Zenoh `namespace`), so several swarms share a network.
+"""
+
+import enum
+
+from attrs import frozen
+
+from shared.errors import DecodeError
+from shared.messages import (
+    DroneState,
+    FormationState,
+    HandSample,
+    Message,
+    PatternEvent,
+    ProcessStatus,
+)
+
+
+class Delivery(enum.StrEnum):
+    """How hard the network tries."""
+
+    STATE = "state"
+    """Best effort, dropped under congestion, express, real-time priority: only the newest counts."""
+    EVENT = "event"
+    """Reliable, in order."""
+
+
+@frozen
+class Topic:
+    """One row: a key pattern and everything that is true of it.
+
+    Attributes:
+        pattern: Key with `{...}` where it varies.
+        kind: Message type.
+        rate_hz: Nominal rate, 0 for events.
+        stale_s: Age after which its content is no longer current, s.
+        delivery: Quality of service.
+    """
+
+    pattern: str
+    kind: type[Message]
+    rate_hz: float
+    stale_s: float
+    delivery: Delivery
+
+    @property
+    def wildcard(self) -> str:
+        """Key expression that matches every key of this topic."""
+        return "/".join("*" if chunk.startswith("{") else chunk for chunk in self.pattern.split("/"))
+
+    def key(self, **parts: object) -> str:
+        """Returns the concrete key, for example `DRONE_STATE.key(id=2)`."""
+        return self.pattern.format(**parts)
+
+
+HAND = Topic("human/hand", HandSample, 60.0, 0.25, Delivery.STATE)
+DRONE_STATE = Topic("drone/{id}/state", DroneState, 60.0, 0.5, Delivery.STATE)
+FORMATION_STATE = Topic("formation/state", FormationState, 20.0, 0.5, Delivery.STATE)
+PATTERN = Topic("glove/pattern", PatternEvent, 0.0, 0.0, Delivery.EVENT)
+STATUS = Topic("status/{role}/{id}", ProcessStatus, 1.0, 3.0, Delivery.EVENT)
+
+TOPICS = (HAND, DRONE_STATE, FORMATION_STATE, PATTERN, STATUS)
+
+ALIVE = "alive/{role}/{id}"
+"""Key of a process's liveliness token."""
+
+
+def topic_of(key: str) -> Topic:
+    """Finds the row that a concrete key belongs to.
+
+    Raises:
+        DecodeError: No topic has such a key.
+    """
+    chunks = key.split("/")
+    for topic in TOPICS:
+        pattern = topic.pattern.split("/")
+        if len(pattern) == len(chunks) and all(
+            p.startswith("{") or p == c for p, c in zip(pattern, chunks, strict=True)
+        ):
+            return topic
+    raise DecodeError("unknown-key", key)

@@ -1,0 +1,91 @@
+"""What a bus is: publish bytes on keys, receive the newest bytes per key, announce presence.
+
+Backends: `shared.bus` (Zenoh) and `shared.memory_bus` (one process, for simulation and tests).
+"""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import NamedTuple, Protocol, Self
+
+from shared.clock import Clock
+from shared.topics import Topic
+
+Publish = Callable[[bytes], None]
+
+PENDING_PER_KEY = 8
+"""How many samples of one key an inbox keeps: the newest counts, a few older ones survive garbage."""
+
+
+class Arrival(NamedTuple):
+    """One payload and when it arrived (receiver's clock)."""
+
+    payload: bytes
+    arrival_ns: int
+
+
+class Inbox:
+    """Where a bus thread puts payloads and the loop takes them; decoding is the loop's work.
+
+    Args:
+        clock: Stamps arrivals.
+        depth: Samples kept per key; when full the oldest is dropped and counted in `dropped`.
+    """
+
+    def __init__(self, clock: Clock, depth: int = PENDING_PER_KEY) -> None:
+        self._clock = clock
+        self._depth = depth
+        self._pending: dict[str, deque[Arrival]] = {}
+        self._lock = threading.Lock()
+        self._filled = threading.Event()
+        self.dropped = 0
+
+    def put(self, key: str, payload: bytes) -> None:
+        """Stores one payload under its key and wakes the loop; called by the bus."""
+        arrival = Arrival(payload, self._clock())
+        with self._lock:
+            queue = self._pending.setdefault(key, deque())
+            if len(queue) >= self._depth:
+                queue.popleft()
+                self.dropped += 1
+            queue.append(arrival)
+        self._filled.set()
+
+    def take(self) -> dict[str, list[Arrival]]:
+        """Returns what has arrived since the last call, per key, oldest first, and empties the inbox."""
+        self._filled.clear()
+        with self._lock:
+            taken = {key: list(queue) for key, queue in self._pending.items()}
+            self._pending.clear()
+        return taken
+
+    def wait(self, timeout_s: float) -> bool:
+        """Blocks until something arrives, at most `timeout_s`; returns whether something is there."""
+        return self._filled.wait(max(0.0, timeout_s))
+
+    def wake(self) -> None:
+        """Ends a `wait` from another thread or a signal handler."""
+        self._filled.set()
+
+
+class Bus(Protocol):
+    """One process's connection to the swarm."""
+
+    def publisher(self, topic: Topic, **parts: object) -> Publish:
+        """Declares a publication, for example `publisher(DRONE_STATE, id=2)`."""
+
+    def subscribe(self, key_expression: str, inbox: Inbox) -> None:
+        """Puts every payload whose key matches (`*` is one chunk) into the inbox."""
+
+    def announce(self, role: str, number: int) -> None:
+        """Shows this process's presence until `close` (a liveliness token)."""
+
+    def watch_presence(self, on_change: Callable[[str, bool], None]) -> None:
+        """Calls `on_change("role/id", present)` for every process that appears or disappears."""
+
+    def close(self) -> None:
+        """Leaves the swarm; returns in bounded time."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
