@@ -1,0 +1,66 @@
+"""One drone: `python -m agents --scenario rhombus --id 2`."""
+
+import argparse
+import sys
+
+from agents.agent import Agent
+from agents.loop import run
+from agents.settings import agent_settings
+from agents.vehicles import open_vehicle
+from shared.bus import ZenohBus
+from shared.clock import system_clock
+from shared.config import load_scenario, vehicle_settings
+from shared.errors import SwarmTouchError
+from shared.formation import build_formation
+from shared.nodes import dials, drone_node, endpoint
+from shared.process import StatusReporter, prepare_process
+from shared.topics import DRONE_STATE
+from shared.transport import Inbox
+
+
+def main() -> int:
+    """Runs one agent until SIGTERM or SIGINT."""
+    args = _parse()
+    stopping = prepare_process(f"drone/{args.id}", verbose=args.verbose)
+    clock = system_clock()
+    try:
+        scenario = load_scenario(args.scenario, args.set)
+        formation = build_formation(scenario, args.scenario)
+        settings = agent_settings(scenario, formation, args.id)
+        agent = Agent(scenario, formation, args.id, settings, epoch=clock())
+        vehicle = open_vehicle(str(vehicle_settings(scenario, args.id).uri))
+        node = drone_node(args.id)
+        bus = ZenohBus(
+            scenario.swarm.name,
+            endpoint(scenario, formation, node),
+            dials(scenario, formation, node),
+            adminspace=scenario.net.adminspace,
+        )
+    except SwarmTouchError as error:
+        print(f"agents: {error}", file=sys.stderr)
+        return 2
+    inbox = Inbox(clock)
+    with bus:
+        for key in agent.senses.keys:
+            bus.subscribe(key, inbox)
+        publish = bus.publisher(DRONE_STATE, id=args.id)
+        run(agent, vehicle, inbox, publish, StatusReporter(bus, "drone", args.id, clock), clock, stopping)
+        vehicle.close()
+    return 0
+
+
+def _parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m agents",
+        description="One drone of the swarm: computes its goal from what it hears and commands its vehicle.",
+        epilog="example: python -m agents --scenario rhombus --id 2 --set vehicles.all.uri=sim://10.0.0.5:7400/{id}",
+    )
+    parser.add_argument("--scenario", required=True, help="scenario file, or the name of one that ships")
+    parser.add_argument("--id", type=int, required=True, help="number of this drone in the scenario")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
+    parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,173 @@
+"""One drone's brain without I/O: bytes and time in, state out. The process loop and the simulator drive it."""
+
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+import numpy as np
+
+from agents.control.avoidance import Encounters
+from agents.control.hand import HandInput
+from agents.control.modes import HAND_STALE
+from agents.control.step import REFERENCE_LOST, Inputs, Reference, Settings, State, start, step
+from agents.senses import Sensed, Senses
+from agents.stepping import due_ns, step_rule
+from agents.vehicles.base import Pose
+from shared.clock import NS_PER_S
+from shared.formation import Formation, Vec
+from shared.messages import NO_HAND, DroneState, HandSample, Heard, Vector
+from shared.scenario import Scenario
+from shared.topics import DRONE_STATE, HAND
+from shared.transport import Arrival
+
+NEVER = float("inf")
+
+
+class Agent:
+    """Decodes what it hears, steps the control law, says what it did.
+
+    Args:
+        scenario: The scenario.
+        formation: Its formation.
+        drone: Own number.
+        settings: Of this drone, see `agents.settings`.
+        epoch: Start of this process, ns.
+    """
+
+    def __init__(
+        self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
+    ) -> None:
+        self.senses = Senses(formation, drone)
+        self.steps = 0
+        self._drone = drone
+        self._epoch = epoch
+        self._references = formation.references(drone)
+        self._settings = settings
+        self._rule = step_rule(scenario.rates)
+        self._nominal_dt = 1.0 / scenario.rates.control_hz
+        self._state: State | None = None
+        self._used: dict[str, Heard] = {}
+        self._last_step_ns = 0
+
+    def receive(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
+        """Takes in what the bus delivered."""
+        self.senses.take(arrivals)
+
+    def due_ns(self, now_ns: int) -> int:
+        """Returns when the next step is due, given what has been heard so far."""
+        return due_ns(self._rule, self._last_step_ns, inputs_complete=self._inputs_complete(now_ns))
+
+    def step(self, now_ns: int, pose: Pose, pose_age: float) -> DroneState:
+        """Computes one step.
+
+        Args:
+            now_ns: Start of the step (own clock).
+            pose: The vehicle's newest report.
+            pose_age: Its age, s.
+
+        Returns:
+            The state to publish; its set-point and mode are for the vehicle. The caller sets `stamp_ns`.
+        """
+        position, velocity = np.array(pose.position), np.array(pose.velocity)
+        if self._state is None:
+            self._state = start(position, self._settings, airborne=pose.airborne)
+        dt = (now_ns - self._last_step_ns) / NS_PER_S if self.steps else self._nominal_dt
+        inputs = self._inputs(now_ns, position, velocity, pose_age)
+        self._state, output = step(self._state, inputs, self._settings, dt)
+        self._used = self._heard()
+        self._last_step_ns = now_ns
+        state = DroneState(
+            epoch=self._epoch,
+            seq=self.steps,
+            stamp_ns=now_ns,
+            id=self._drone,
+            position=pose.position,
+            velocity=pose.velocity,
+            goal=_vector(output.goal),
+            goal_velocity=_vector(output.goal_velocity),
+            setpoint=_vector(output.setpoint),
+            mode=self._state.mode.mode,
+            displacements={
+                link.name: _vector(x)
+                for link, x in zip(self._settings.rows.links, self._state.links.displacement, strict=True)
+            },
+            pose_age=pose_age,
+            battery=pose.battery,
+            flags=output.flags,
+            heard=self._used,
+            step_ns=now_ns,
+        )
+        self.steps += 1
+        return state
+
+    def _inputs_complete(self, now_ns: int) -> bool:
+        """Says whether the hand and every reference that is alive are newer than at the last step."""
+        hand = self.senses.hand
+        fresh = [
+            self._is_fresh(DRONE_STATE.key(id=other), sensed)
+            for other in self._references
+            if (sensed := self.senses.drones.get(other)) and sensed.age(now_ns) <= REFERENCE_LOST
+        ]
+        if hand is not None and hand.age(now_ns) <= HAND_STALE:
+            fresh.append(self._is_fresh(HAND.key(), hand))
+        return bool(fresh) and all(fresh)
+
+    def _is_fresh(self, key: str, sensed: Sensed[HandSample] | Sensed[DroneState]) -> bool:
+        used = self._used.get(key)
+        return used is None or (used.epoch, used.seq) != (sensed.message.epoch, sensed.message.seq)
+
+    def _inputs(self, now_ns: int, position: Vec, velocity: Vec, pose_age: float) -> Inputs:
+        hand = self.senses.hand
+        return Inputs(
+            position=position,
+            velocity=velocity,
+            pose_age=pose_age,
+            hand=None if hand is None or hand.message.position == NO_HAND else _hand_input(hand.message),
+            wish=None if hand is None else hand.message.mode,
+            hand_age=NEVER if hand is None else hand.age(now_ns),
+            hand_fresh=hand is not None and self._is_fresh(HAND.key(), hand),
+            references=tuple(self._reference(other, now_ns) for other in self._references),
+            drones=_encounters([sensed.message for sensed in self.senses.drones.values()]),
+        )
+
+    def _reference(self, other: int, now_ns: int) -> Reference | None:
+        sensed = self.senses.drones.get(other)
+        if sensed is None:
+            return None
+        state, stable = sensed.message, self._settings.stable
+        return Reference(
+            point=np.array(state.goal if stable else state.position),
+            velocity=np.array(state.goal_velocity if stable else state.velocity),
+            goal_velocity=np.array(state.goal_velocity),
+            mode=state.mode,
+            age=sensed.age(now_ns),
+            fresh=self._is_fresh(DRONE_STATE.key(id=other), sensed),
+        )
+
+    def _heard(self) -> dict[str, Heard]:
+        """Returns what this step used: the hand and the references."""
+        heard = {} if self.senses.hand is None else {HAND.key(): self.senses.hand.heard}
+        for other in self._references:
+            if other in self.senses.drones:
+                heard[DRONE_STATE.key(id=other)] = self.senses.drones[other].heard
+        return heard
+
+
+def _hand_input(sample: HandSample) -> HandInput:
+    return HandInput(
+        position=np.array(sample.position),
+        velocity=np.array(sample.velocity),
+        yaw=sample.yaw,
+        stamp=sample.stamp_ns / NS_PER_S,
+    )
+
+
+def _encounters(states: Sequence[DroneState]) -> Encounters:
+    return Encounters(
+        row=np.zeros(len(states), dtype=np.intp),
+        position=np.array([state.position[:2] for state in states]).reshape(-1, 2),
+        velocity=np.array([state.velocity[:2] for state in states]).reshape(-1, 2),
+    )
+
+
+def _vector(array: Vec) -> Vector:
+    return cast(Vector, tuple(array.tolist()))

@@ -1,0 +1,139 @@
+"""Avoidance as velocities of the reference point, planar (DESIGN section 4).
+
+Columns: potential field, Eqs. 14-16, `U = xi/2 |p - goal|^2 + sum eta/2 (1/rho - 1/d0)^2` with rho the distance
+to the surface. Every other drone and the hand: the same repulsion, and `escape`, which looks ahead, because a
+body follows its set-point about half a second late.
+
+Encounters are flat lists of pairs, so that one agent and a large batch run the same code.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from attrs import field, frozen
+
+from shared.formation import Vec
+from shared.scenario import FieldSettings
+
+FLOOR = 0.02
+"""Smallest rho that is computed with, m."""
+
+
+@frozen(kw_only=True)
+class Bubble:
+    """Distance that `escape` keeps.
+
+    Attributes:
+        radius: From something that does not come closer, m.
+        lead: The bubble grows by this time times the closing speed, s.
+        response: Time constant of leaving the bubble, s.
+    """
+
+    radius: float
+    lead: float = 0.45
+    response: float = 0.10
+
+
+DRONE_BUBBLE = Bubble(radius=0.26)
+HAND_BUBBLE = Bubble(radius=0.38)
+
+
+@frozen(kw_only=True)
+class Encounters:
+    """Pairs of one of our n points and something else.
+
+    Attributes:
+        row: (k,) which of our points.
+        position: (k, 2) where the other is, m.
+        velocity: (k, 2) how it moves, m/s.
+    """
+
+    row: npt.NDArray[np.intp] = field(eq=False)
+    position: Vec = field(eq=False)
+    velocity: Vec = field(eq=False)
+
+
+def repulsion(gaps: Vec, settings: FieldSettings) -> Vec:
+    """Returns the repulsive velocity `eta (1/rho - 1/d0) / rho^2` away from each obstacle, Eq. 16.
+
+    Args:
+        gaps: (..., 2) vectors from obstacle centres to the point, m.
+        settings: Gain, range and radius.
+
+    Returns:
+        (..., 2) m/s; zero beyond `radius + d0`.
+    """
+    distance = _length(gaps)
+    rho = np.maximum(distance - settings.radius, FLOOR)
+    strength = settings.eta * (1.0 / rho - 1.0 / settings.d0) / (rho * rho)
+    return np.where(rho < settings.d0, strength, 0.0) * _heading(gaps, distance)
+
+
+def column_velocity(
+    points: Vec, goals: Vec, columns: Vec, settings: FieldSettings, xi: float
+) -> tuple[Vec, npt.NDArray[np.bool_]]:
+    """Returns `-grad U` (n, 2), m/s, and a mask (n, 1) of the points that any column acts on.
+
+    Args:
+        points: (n, 2) m.
+        goals: (n, 2) m.
+        columns: (c, 2) centres, m.
+        settings: Field of a column.
+        xi: Gain of the attraction, 1/s.
+    """
+    gaps = points[:, None, :] - columns
+    near = np.any(_length(gaps) < settings.radius + settings.d0, axis=1)
+    return xi * (goals - points) + repulsion(gaps, settings).sum(axis=1), near
+
+
+def separation(points: Vec, others: Encounters, settings: FieldSettings) -> Vec:
+    """Returns the summed repulsion (n, 2) of the encounters, m/s."""
+    return _sum_rows(others, repulsion(points[others.row] - others.position, settings), len(points))
+
+
+def escape(wanted: Vec, points: Vec, velocities: Vec, others: Encounters, bubble: Bubble) -> Vec:
+    """Returns the velocity (n, 2) to add so that no encounter's bubble is entered, or it is left quickly.
+
+    In a bubble the point must move away at `depth / response` plus the other's own speed towards it; whatever
+    of that is missing from `wanted` is added.
+
+    Args:
+        wanted: (n, 2) velocity so far, m/s.
+        points: (n, 2) m.
+        velocities: (n, 2) m/s.
+        others: What to keep away from.
+        bubble: How far.
+    """
+    row = others.row
+    gaps = points[row] - others.position
+    distance = _length(gaps)
+    heading = _heading(gaps, distance)
+    approach = _along(others.velocity, heading)
+    closing = np.maximum(approach - _along(velocities[row], heading), 0.0)
+    depth = bubble.radius + bubble.lead * closing - distance
+    needed = depth / bubble.response + np.maximum(approach, 0.0)
+    missing = np.where(depth > 0.0, np.maximum(needed - _along(wanted[row], heading), 0.0), 0.0)
+    return _sum_rows(others, missing * heading, len(points))
+
+
+def _sum_rows(others: Encounters, pushes: Vec, n: int) -> Vec:
+    if n == 1:
+        return np.add.reduce(pushes, axis=0, keepdims=True)
+    total = np.empty((n, 2))
+    for axis in (0, 1):
+        total[:, axis] = np.bincount(others.row, weights=pushes[:, axis], minlength=n)
+    return total
+
+
+def _along(vectors: Vec, heading: Vec) -> Vec:
+    along: Vec = np.einsum("ki,ki->k", vectors, heading)
+    return along[:, None]
+
+
+def _length(vectors: Vec) -> Vec:
+    lengths: Vec = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    return lengths[..., None]
+
+
+def _heading(gaps: Vec, distance: Vec) -> Vec:
+    # A point exactly on a centre has no direction of its own; it leaves along +x.
+    return np.where(distance > 1e-9, gaps / np.maximum(distance, 1e-9), (1.0, 0.0))

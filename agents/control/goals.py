@@ -1,0 +1,106 @@
+"""Goals from references and link corrections: one matrix row per drone (Eqs. 11-13, DESIGN section 4)."""
+
+import math
+
+import numpy as np
+from attrs import field, frozen
+
+from agents.control.hand import MappedHand
+from agents.control.impedance import LinkState
+from shared.formation import Formation, Link, Vec
+
+
+@frozen(kw_only=True)
+class Rows:
+    """The part of a formation that a computation covers: one row for an agent, all for a simulator.
+
+    Attributes:
+        weights: (n, 1 + m) reference weights over `[human, m references]`.
+        offsets: (n, 3) m, formation frame.
+        links: The L links into these drones.
+        incidence: (n, L) which link acts on which row.
+        limits: (L, 1) bound per displacement, m.
+        scale: Factor on every correction.
+    """
+
+    weights: Vec = field(eq=False)
+    offsets: Vec = field(eq=False)
+    links: tuple[Link, ...]
+    incidence: Vec = field(eq=False)
+    limits: Vec = field(eq=False)
+    scale: float
+
+
+def agent_row(formation: Formation, drone: int) -> Rows:
+    """Returns the row of one drone; its columns are `[human, formation.references(drone)...]`."""
+    row = formation.row(drone)
+    columns = [0, *(1 + formation.row(other) for other in formation.references(drone))]
+    return _rows(formation, [row], formation.weights[row][columns][None, :], formation.links_into(drone))
+
+
+def all_rows(formation: Formation) -> Rows:
+    """Returns the rows of all drones; the columns are `[human, drones...]`."""
+    return _rows(formation, list(range(len(formation.ids))), formation.weights, formation.links)
+
+
+def _rows(formation: Formation, rows: list[int], weights: Vec, links: tuple[Link, ...]) -> Rows:
+    incidence = np.array([[float(link.target == row) for link in links] for row in rows])
+    return Rows(
+        weights=weights,
+        offsets=formation.offsets[rows],
+        links=links,
+        incidence=incidence.reshape(len(rows), len(links)),
+        limits=np.array([link.limit for link in links]).reshape(-1, 1),
+        scale=formation.correction_scale,
+    )
+
+
+def corrections(rows: Rows, links: LinkState) -> tuple[Vec, Vec]:
+    """Returns the corrections (n, 3), m, and their rates (n, 3), m/s, in the formation's frame.
+
+    `correction_i = (-|sum dx|, sum dy, sum dz)` over the links into i. Each term is clamped per axis, its
+    state is not; a clamped term has no rate.
+    """
+    term = np.minimum(np.maximum(links.displacement, -rows.limits), rows.limits)
+    moving = np.where(term == links.displacement, links.rate, 0.0)
+    total, rate = rows.incidence @ term, rows.incidence @ moving
+    rate[:, 0] *= -np.sign(total[:, 0])
+    total[:, 0] = -np.abs(total[:, 0])
+    return rows.scale * total, rows.scale * rate
+
+
+def goals(rows: Rows, references: Vec, correction: Vec, yaw: float) -> Vec:
+    """Returns the goals (n, 3), world frame, m: `W [p_hand; p_1..p_m] + R(yaw) (offset + correction)`.
+
+    Args:
+        rows: The rows to compute.
+        references: (1 + m, 3) mapped hand and references: actual positions (`paper`) or goals (`stable`).
+        correction: (n, 3) formation frame, m.
+        yaw: Heading of the formation, rad.
+    """
+    return rows.weights @ references + rotate(rows.offsets + correction, yaw)
+
+
+def goal_velocities(
+    rows: Rows, reference_velocities: Vec, correction_rate: Vec, shift: Vec, hand: MappedHand
+) -> Vec:
+    """Returns the rates of the goals (n, 3), m/s, from the hand's velocity and the link rates.
+
+    Args:
+        rows: The rows to compute.
+        reference_velocities: (1 + m, 3) mapped hand velocity and the references' goal velocities.
+        correction_rate: (n, 3) formation frame, m/s.
+        shift: (n, 3) offset plus correction, formation frame, m.
+        hand: Gives yaw and yaw rate.
+    """
+    turning = hand.yaw_rate * np.column_stack([-shift[:, 1], shift[:, 0], np.zeros(len(shift))])
+    return rows.weights @ reference_velocities + rotate(correction_rate + turning, hand.yaw)
+
+
+def rotate(vectors: Vec, yaw: float) -> Vec:
+    """Turns vectors (..., 3) about z by `yaw`."""
+    if yaw == 0.0:
+        return vectors
+    c, s = math.cos(yaw), math.sin(yaw)
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.stack([c * x - s * y, s * x + c * y, z], axis=-1)

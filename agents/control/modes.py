@@ -1,0 +1,135 @@
+"""Flight modes of one drone: GROUND -> TAKEOFF -> FOLLOW <-> HOLD -> LAND -> GROUND, STOP latched.
+
+A pure function of what this drone knows; there is no coordinator (DESIGN section 5). Every mode can be left
+except STOP.
+"""
+
+from attrs import evolve, frozen
+
+from shared.messages import Mode, Wish
+
+HAND_STALE = 0.25
+"""A hand older than this no longer moves anything, s."""
+HAND_HOLD = 1.0
+"""After this long without the hand: HOLD, s."""
+HAND_LAND = 10.0
+"""After this long without the hand: LAND, s."""
+POSE_FRESH = 0.1
+"""Take-off needs a pose at most this old, s."""
+ARRIVED = 0.10
+"""Take-off ends this close to the take-off height, m."""
+TOUCHDOWN = 0.06
+"""Below this height a landing drone is on the ground, m."""
+
+AIRBORNE_MODES = frozenset({Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND})
+GUIDED_MODES = frozenset({Mode.FOLLOW, Mode.HOLD})
+"""Modes in which a drone is part of the formation and can be referred to."""
+
+
+@frozen(kw_only=True)
+class ModeInputs:
+    """What decides about the mode.
+
+    Attributes:
+        wish: The operator's newest wish, None before the first sample.
+        hand_age: Time since the newest hand sample arrived, s; infinite before the first.
+        pose_age: Time since the vehicle's newest pose arrived, s; infinite before the first.
+        height: Height of the body, m.
+        takeoff_height: Height at which it joins the formation, m.
+        references_usable: Every reference is heard and part of the formation.
+        references_follow: Every reference is in FOLLOW.
+    """
+
+    wish: Wish | None
+    hand_age: float
+    pose_age: float
+    height: float
+    takeoff_height: float
+    references_usable: bool
+    references_follow: bool
+
+
+@frozen(kw_only=True)
+class ModeState:
+    """Mode, and whether the operator has to ask again before it may fly.
+
+    Attributes:
+        mode: The flight mode.
+        must_ask_again: Set by a landing that the operator did not wish; cleared by any wish but FLY.
+    """
+
+    mode: Mode
+    must_ask_again: bool = False
+
+
+def initial_mode(*, airborne: bool) -> ModeState:
+    """Returns the mode of a (re)started process: HOLD if its body is in the air, else GROUND."""
+    return ModeState(mode=Mode.HOLD if airborne else Mode.GROUND)
+
+
+def next_mode(state: ModeState, inputs: ModeInputs) -> ModeState:
+    """Returns the mode after one step."""
+    if state.mode is Mode.STOP or inputs.wish is Wish.STOP:
+        return evolve(state, mode=Mode.STOP)
+    if state.must_ask_again and inputs.hand_age <= HAND_STALE and inputs.wish is not Wish.FLY:
+        state = evolve(state, must_ask_again=False)
+    return _NEXT[state.mode](state, inputs)
+
+
+def _ground(state: ModeState, inputs: ModeInputs) -> ModeState:
+    ready = inputs.pose_age <= POSE_FRESH and _flown_by_hand(inputs) and not state.must_ask_again
+    return evolve(state, mode=Mode.TAKEOFF) if ready else state
+
+
+def _takeoff(state: ModeState, inputs: ModeInputs) -> ModeState:
+    if _landing_wished(inputs) or inputs.hand_age > HAND_LAND:
+        return _land(state, inputs)
+    if inputs.height >= inputs.takeoff_height - ARRIVED:
+        return evolve(state, mode=Mode.FOLLOW if _may_follow(inputs) else Mode.HOLD)
+    return state
+
+
+def _follow(state: ModeState, inputs: ModeInputs) -> ModeState:
+    if _landing_wished(inputs) or inputs.hand_age > HAND_LAND:
+        return _land(state, inputs)
+    held = inputs.wish is Wish.HOLD or inputs.hand_age > HAND_HOLD or not inputs.references_follow
+    return evolve(state, mode=Mode.HOLD) if held else state
+
+
+def _hold(state: ModeState, inputs: ModeInputs) -> ModeState:
+    # A process that has never heard a hand holds: whoever started it can still land it by hand or by STOP.
+    silent = HAND_LAND < inputs.hand_age < float("inf")
+    if _landing_wished(inputs) or silent:
+        return _land(state, inputs)
+    return evolve(state, mode=Mode.FOLLOW) if _may_follow(inputs) else state
+
+
+def _landing(state: ModeState, inputs: ModeInputs) -> ModeState:
+    return evolve(state, mode=Mode.GROUND) if inputs.height <= TOUCHDOWN else state
+
+
+def _land(state: ModeState, inputs: ModeInputs) -> ModeState:
+    wished = _landing_wished(inputs) and inputs.hand_age <= HAND_LAND
+    return ModeState(mode=Mode.LAND, must_ask_again=state.must_ask_again or not wished)
+
+
+def _landing_wished(inputs: ModeInputs) -> bool:
+    """GROUND in flight means LAND."""
+    return inputs.wish in (Wish.LAND, Wish.GROUND)
+
+
+def _flown_by_hand(inputs: ModeInputs) -> bool:
+    return inputs.wish is Wish.FLY and inputs.hand_age <= HAND_STALE
+
+
+def _may_follow(inputs: ModeInputs) -> bool:
+    return _flown_by_hand(inputs) and inputs.references_follow
+
+
+_NEXT = {
+    Mode.GROUND: _ground,
+    Mode.TAKEOFF: _takeoff,
+    Mode.FOLLOW: _follow,
+    Mode.HOLD: _hold,
+    Mode.LAND: _landing,
+}

@@ -1,0 +1,114 @@
+"""What a drone has heard: the newest valid sample per topic, and what was rejected, by reason."""
+
+import logging
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Generic, TypeVar
+
+from attrs import frozen
+
+from shared.clock import NS_PER_S
+from shared.codec import decode
+from shared.errors import DecodeError
+from shared.formation import Formation
+from shared.messages import DroneState, HandSample, Heard, Message
+from shared.nodes import neighbours
+from shared.topics import DRONE_STATE, HAND
+from shared.transport import Arrival
+
+M = TypeVar("M", bound=Message)
+
+_LOG_PERIOD_NS = 5 * NS_PER_S
+_log = logging.getLogger("senses")
+
+
+@frozen
+class Sensed(Generic[M]):
+    """One message and when it arrived (own clock, ns)."""
+
+    message: M
+    arrival_ns: int
+
+    @property
+    def heard(self) -> Heard:
+        """Returns what to report about having used it."""
+        return Heard(self.message.epoch, self.message.seq, self.arrival_ns)
+
+    def age(self, now_ns: int) -> float:
+        """Returns the time since it arrived, s."""
+        return (now_ns - self.arrival_ns) / NS_PER_S
+
+
+class Senses:
+    """Newest valid hand sample and drone states of one agent.
+
+    Args:
+        formation: Whom there is to hear.
+        drone: Own number.
+
+    Attributes:
+        hand: Newest hand sample, None before the first.
+        drones: Newest state per drone that was ever heard.
+        rejected: Dropped samples by reason.
+    """
+
+    def __init__(self, formation: Formation, drone: int) -> None:
+        self.hand: Sensed[HandSample] | None = None
+        self.drones: dict[int, Sensed[DroneState]] = {}
+        self.rejected: Counter[str] = Counter()
+        self._ids = {DRONE_STATE.key(id=other): other for other in neighbours(formation, drone)}
+        self._logged_ns = 0
+
+    @property
+    def keys(self) -> list[str]:
+        """Returns the keys to subscribe to."""
+        return [HAND.key(), *self._ids]
+
+    def take(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
+        """Decodes what has arrived; nothing that anyone sends raises."""
+        for key, samples in arrivals.items():
+            for payload, arrival_ns in samples:
+                try:
+                    self._take_one(key, payload, arrival_ns)
+                except DecodeError as error:
+                    self._reject(key, error, arrival_ns)
+
+    def _take_one(self, key: str, payload: bytes, arrival_ns: int) -> None:
+        if key == HAND.key():
+            sample = decode(payload, HandSample)
+            _check_newer(sample, self.hand, arrival_ns, HAND.stale_s)
+            self.hand = Sensed(sample, arrival_ns)
+            return
+        drone = self._ids.get(key)
+        if drone is None:
+            raise DecodeError("unknown-key", key)
+        state = decode(payload, DroneState)
+        if state.id != drone:
+            raise DecodeError("wrong-id", f"drone {state.id} on {key}")
+        _check_newer(state, self.drones.get(drone), arrival_ns, DRONE_STATE.stale_s)
+        self.drones[drone] = Sensed(state, arrival_ns)
+
+    def _reject(self, key: str, error: DecodeError, now_ns: int) -> None:
+        self.rejected[error.reason] += 1
+        if now_ns - self._logged_ns > _LOG_PERIOD_NS:
+            self._logged_ns = now_ns
+            _log.warning("dropped a sample on %s: %s (so far %s)", key, error, dict(self.rejected))
+
+
+def _check_newer(
+    message: Message, known: Sensed[HandSample] | Sensed[DroneState] | None, now_ns: int, stale_s: float
+) -> None:
+    """Refuses what is not newer by (epoch, seq).
+
+    Raises:
+        DecodeError: `out-of-order`. An older epoch is accepted once the newer one has fallen silent, or a
+            publisher whose clock was set back would never be heard again.
+    """
+    if known is None:
+        return
+    last = known.message
+    if (message.epoch, message.seq) > (last.epoch, last.seq):
+        return
+    if message.epoch < last.epoch and known.age(now_ns) > stale_s:
+        return
+    raise DecodeError("out-of-order", f"({message.epoch}, {message.seq}) after ({last.epoch}, {last.seq})")

@@ -1,0 +1,1 @@
+"""Simulated bodies: pure, vectorised over drones, explicit state (DESIGN section 7)."""

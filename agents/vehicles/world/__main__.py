@@ -1,0 +1,57 @@
+"""Runs the simulated world: `python -m agents.vehicles.world --scenario rhombus`."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from agents.vehicles.world.hand import HandWatch
+from agents.vehicles.world.radio import Radio
+from agents.vehicles.world.record import RefereeFile
+from agents.vehicles.world.setup import plan_world
+from agents.vehicles.world.world import World
+from shared.bus import ZenohBus
+from shared.clock import system_clock
+from shared.config import load_scenario
+from shared.errors import SwarmTouchError
+from shared.nodes import WORLD, dials, endpoint
+from shared.process import StatusReporter, prepare_process
+
+
+def main() -> int:
+    """Steps every simulated body until SIGTERM or SIGINT; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m agents.vehicles.world",
+        description="The simulated world: all bodies, their links and the referee.",
+        epilog="example: python -m agents.vehicles.world --scenario maze --set vehicles.all.body=crazyflie",
+    )
+    parser.add_argument("--scenario", required=True, help="TOML file, or the name of one that ships")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
+    parser.add_argument("--run-dir", type=Path, help="folder for referee.json")
+    parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
+    arguments = parser.parse_args()
+    stopping = prepare_process("world", verbose=arguments.verbose)
+    try:
+        scenario = load_scenario(arguments.scenario, arguments.set)
+        setup = plan_world(scenario)
+        radio = Radio(setup.address, setup.fleet.ids, setup.hovers)
+        listen = endpoint(scenario, setup.formation, WORLD)
+        connect = dials(scenario, setup.formation, WORLD)
+        bus = ZenohBus(scenario.swarm.name, listen, connect, adminspace=scenario.net.adminspace)
+    except SwarmTouchError as error:
+        print(f"world: {error}", file=sys.stderr)
+        return 2
+    clock = system_clock()
+    with radio, bus, RefereeFile(arguments.run_dir) as report:
+        hand, status = HandWatch(bus, clock), StatusReporter(bus, WORLD, 0, clock)
+        world = World(setup.fleet, radio, setup.rules, time.monotonic())
+        while not stopping.wait(max(0.0, world.next_tick - time.monotonic())):
+            world.run_until(time.monotonic(), hand.position())
+            report.write_when_due(time.monotonic(), world.metrics)
+            status.tick(world.ticks, "running", radio.rejected + hand.rejected, world.metrics)
+        status.tick(world.ticks, "ending", radio.rejected + hand.rejected, world.metrics, force=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""How a swarm is run: command line, launcher, simulators, scenarios."""

@@ -1,0 +1,194 @@
+"""The world around its bodies: garbage, slow machines, planning, the report on disk."""
+
+import json
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.vehicles.bodies.fleet import park_fleet
+from agents.vehicles.bodies.state import Command
+from agents.vehicles.link import Verb, decode_pose, encode_order
+from agents.vehicles.world.hand import HandWatch
+from agents.vehicles.world.radio import Radio
+from agents.vehicles.world.record import RefereeFile
+from agents.vehicles.world.referee import Rules
+from agents.vehicles.world.setup import plan_world
+from agents.vehicles.world.world import MAX_CATCH_UP, TICK, World
+from shared.codec import encode
+from shared.config import structure_scenario
+from shared.errors import ConfigError, DeviceError
+from shared.memory_bus import MemoryBus, MemoryNetwork
+from shared.messages import HandSample, Wish
+from shared.topics import HAND
+
+IDS = (1, 2)
+
+
+@pytest.fixture
+def radio() -> Iterator[Radio]:
+    with Radio(("127.0.0.1", 0), IDS, np.array([False, True])) as made:
+        yield made
+
+
+@pytest.fixture
+def driver(radio: Radio) -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        made.connect(("127.0.0.1", radio.port))
+        made.settimeout(5.0)
+        yield made
+
+
+def make_world(radio: Radio) -> World:
+    fleet = park_fleet({1: "identified", 2: "crazyflie"}, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    rules = Rules(
+        ids=IDS, columns=np.zeros((0, 2)), column_radius=0.1, fence=(np.full(3, -9.0), np.full(3, 9.0))
+    )
+    return World(fleet, radio, rules, 10.0)
+
+
+def test_garbage_is_counted_and_changes_nothing(radio: Radio, driver: socket.socket) -> None:
+    driver.send(encode_order(1, Verb.FLY, (0.0, 0.0, 1.0)))
+    radio.receive(10.0)
+    wrong = bytearray(encode_order(1, Verb.STOP))
+    wrong[2] = 9
+    for datagram in (b"", b"x", b"ST" * 60, bytes(wrong), encode_order(3, Verb.STOP)):
+        driver.send(datagram)
+    radio.receive(10.1)
+    assert radio.rejected == {"malformed": 3, "version": 1, "unknown-drone": 1}
+    assert radio.commands(10.1).kind.tolist() == [Command.FLY, Command.CUT]
+
+
+def test_newest_command_wins_and_ages(radio: Radio, driver: socket.socket) -> None:
+    for drone in IDS:
+        driver.send(encode_order(drone, Verb.FLY, (0.0, 0.0, 1.0)))
+        driver.send(encode_order(drone, Verb.FLY, (0.5, 0.0, 1.0)))
+    radio.receive(10.0)
+    assert radio.commands(10.0).setpoint.tolist() == [[0.5, 0.0, 1.0], [0.5, 0.0, 1.0]]
+    assert radio.commands(10.6).kind.tolist() == [Command.LEVEL, Command.FLY]
+    assert radio.commands(12.1).kind.tolist() == [Command.CUT, Command.FLY]
+
+
+def test_hello_is_no_command(radio: Radio, driver: socket.socket) -> None:
+    driver.send(encode_order(2, Verb.FLY, (0.0, 0.0, 1.0)))
+    radio.receive(10.0)
+    driver.send(encode_order(2, Verb.HELLO))
+    radio.receive(10.1)
+    assert radio.commands(10.1).kind[1] == Command.FLY
+
+
+def test_poses_go_to_whoever_spoke_last(radio: Radio, driver: socket.socket) -> None:
+    world = make_world(radio)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.sendto(encode_order(2, Verb.HELLO), ("127.0.0.1", radio.port))
+        radio.receive(10.0)
+        driver.send(encode_order(2, Verb.HELLO))
+        world.run_until(10.0 + TICK)
+        drone, pose = decode_pose(driver.recv(128))
+        other.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            other.recv(128)
+    assert drone == 2
+    assert pose.position == (1.0, 0.0, 0.0)
+
+
+def test_ticks_follow_the_clock_however_often_it_is_asked(radio: Radio) -> None:
+    world = make_world(radio)
+    for now in (10.004, 10.0101, 10.0102, 10.0299, 10.05):
+        world.run_until(now)
+    assert world.ticks == 5
+    assert world.next_tick == pytest.approx(10.06)
+    assert world.metrics()["lost_time_s"] == 0.0
+
+
+def test_time_beyond_the_catch_up_is_given_up(radio: Radio) -> None:
+    world = make_world(radio)
+    world.run_until(12.0)
+    assert world.ticks == MAX_CATCH_UP
+    assert world.metrics()["lost_time_s"] == pytest.approx(2.0 - MAX_CATCH_UP * TICK)
+    world.run_until(12.0 + TICK)
+    assert world.ticks == MAX_CATCH_UP + 1
+
+
+def test_a_taken_address_says_what_to_do(radio: Radio) -> None:
+    with pytest.raises(DeviceError, match="another world may be running"):
+        Radio(("127.0.0.1", radio.port), IDS, np.array([False, True]))
+
+
+def test_plan_parks_the_formation_at_home() -> None:
+    scenario = structure_scenario(
+        {
+            "hand": {"home": [1.0, 2.0]},
+            "formation": {"shape": "rhombus"},
+            "obstacles": [{"name": "a", "x": 5.0, "y": 6.0}],
+            "vehicles": {"all": {"link_loss": "hover"}, "robots": {"3": {"body": "crazyflie"}}},
+        },
+        "test",
+    )
+    setup = plan_world(scenario)
+    assert setup.fleet.ids == (1, 2, 3, 4)
+    assert setup.address == ("127.0.0.1", 7400)
+    assert setup.hovers.all()
+    assert setup.rules.columns.tolist() == [[5.0, 6.0]]
+    expected = setup.formation.rest[:, :2] + np.array([1.0, 2.0])
+    assert setup.fleet.position[:, :2].tolist() == expected.tolist()
+    assert not setup.fleet.position[:, 2].any()
+    assert {group.body: group.rows.tolist() for group in setup.fleet.groups} == {
+        "identified": [0, 1, 3],
+        "crazyflie": [2],
+    }
+
+
+@pytest.mark.parametrize(
+    ("vehicles", "hint"),
+    [
+        ({"all": {"uri": "sim://127.0.0.1:7400/1"}}, r"drone 2 has .* which is drone 1; end it with /\{id\}"),
+        ({"robots": {"1": {"uri": "sim://127.0.0.1:7401/1"}}}, "a world serves one sim:// address"),
+        ({"all": {"uri": "radio://0/80/2M/{id}"}}, "none"),
+    ],
+)
+def test_plans_that_no_world_can_serve_are_refused(vehicles: dict[str, object], hint: str) -> None:
+    scenario = structure_scenario({"formation": {"shape": "rhombus"}, "vehicles": vehicles}, "test")
+    with pytest.raises(ConfigError, match=hint):
+        plan_world(scenario)
+
+
+def test_hand_watch_keeps_the_newest_valid_position() -> None:
+    network = MemoryNetwork()
+    watch = HandWatch(MemoryBus(network), lambda: 0)
+    publish: Callable[[bytes], None] = MemoryBus(network).publisher(HAND)
+    assert watch.position() is None
+    for seq, x in enumerate((1.0, 2.0)):
+        publish(encode(_hand(seq, x)))
+    publish(b"\xc1")
+    position = watch.position()
+    assert position is not None
+    assert position.tolist() == [2.0, 0.0, 1.2]
+    assert watch.rejected == {"malformed": 1}
+
+
+def test_report_is_written_once_a_second_and_at_the_end(tmp_path: Path) -> None:
+    numbers = {"collisions": 0.0}
+    path = tmp_path / "run" / "referee.json"
+    with RefereeFile(tmp_path / "run") as report:
+        report.write_when_due(5.0, lambda: numbers)
+        assert json.loads(path.read_text(encoding="utf-8")) == {"collisions": 0.0}
+        numbers["collisions"] = 1.0
+        report.write_when_due(5.9, lambda: numbers)
+        assert json.loads(path.read_text(encoding="utf-8")) == {"collisions": 0.0}
+    assert json.loads(path.read_text(encoding="utf-8")) == {"collisions": 1.0}
+    assert [p.name for p in path.parent.iterdir()] == ["referee.json"]
+
+
+def test_report_that_cannot_be_written_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "run").write_text("a file where the folder should be", encoding="utf-8")
+    RefereeFile(tmp_path / "run").write_when_due(0.0, dict)
+    assert "cannot write" in caplog.text
+
+
+def _hand(seq: int, x: float) -> HandSample:
+    return HandSample(
+        epoch=1, seq=seq, stamp_ns=0, position=(x, 0.0, 1.2), velocity=(0.0, 0.0, 0.0), yaw=0.0, mode=Wish.FLY
+    )
