@@ -1,0 +1,1 @@
+"""The hand: tracking source, velocity, simplex broadcast. It only ever sends."""

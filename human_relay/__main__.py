@@ -1,0 +1,58 @@
+"""`python -m human_relay`: broadcasts one hand to the swarm. Publish-only: it subscribes to nothing."""
+
+import argparse
+import sys
+from contextlib import closing
+
+from human_relay.loop import run
+from human_relay.orders import OrderReader
+from human_relay.sources import open_source
+from shared.bus import ZenohBus
+from shared.clock import system_clock
+from shared.config import load_scenario
+from shared.errors import SwarmTouchError
+from shared.formation import build_formation
+from shared.nodes import RELAY, dials, endpoint
+from shared.process import prepare_process
+
+_EXAMPLE = """example: python -m human_relay --scenario rhombus --hand "scripted:tour?peak=0.4"
+Orders are lines on standard input: fly, hold, land, stop (stop is final)."""
+
+
+def main() -> int:
+    """Runs the relay until SIGTERM or SIGINT; returns the exit code."""
+    arguments = _parse()
+    stopping = prepare_process(RELAY, verbose=arguments.verbose)
+    clock = system_clock()
+    try:
+        scenario = load_scenario(arguments.scenario, arguments.set)
+        formation = build_formation(scenario, arguments.scenario)
+        listen, connect = endpoint(scenario, formation, RELAY), dials(scenario, formation, RELAY)
+        with (
+            ZenohBus(scenario.swarm.name, listen, connect, adminspace=scenario.net.adminspace) as bus,
+            closing(open_source(arguments.hand, clock())) as source,
+        ):
+            orders = OrderReader(sys.stdin.fileno() if sys.stdin else None)
+            run(source, orders.wait, bus, clock, stopping)
+    except SwarmTouchError as error:
+        print(f"relay: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m human_relay",
+        description=__doc__,
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--scenario", required=True, help="TOML file, or the name of one that ships")
+    parser.add_argument("--hand", default="scripted:tour", help="URI of the hand source (%(default)s)")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
+    parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,50 @@
+"""The relay's loop: receive from the source and the operator, compute, publish; nothing comes back."""
+
+import threading
+from collections.abc import Callable
+
+from human_relay.relay import RelayState, has_news, make_sample, order, repeat_ns
+from human_relay.sources.base import HandSource
+from shared.clock import NS_PER_S, Clock
+from shared.codec import encode
+from shared.messages import Wish
+from shared.nodes import RELAY
+from shared.process import StatusReporter
+from shared.topics import HAND
+from shared.transport import Bus
+
+WaitForOrders = Callable[[float], list[Wish]]
+"""Waits for at most so many seconds; returns the operator's orders so far, at once when there are any."""
+
+
+def run(source: HandSource, wait: WaitForOrders, bus: Bus, clock: Clock, stopping: threading.Event) -> None:
+    """Relays until told to stop: each pose of the source once, at its time, and repeats while it is silent.
+
+    Args:
+        source: The hand.
+        wait: The operator, and the only place where the loop rests.
+        bus: Only published on.
+        clock: Clock of the process, the one that the source was opened with.
+        stopping: Ends the loop.
+    """
+    publish = bus.publisher(HAND)
+    status = StatusReporter(bus, RELAY, 0, clock)
+    state = RelayState(epoch=clock())
+    ordered: list[Wish] = []
+
+    def report(word: str, *, force: bool = False) -> None:
+        metrics = {"samples": float(state.seq)}
+        status.tick(state.seq, word, {"impossible-pose": state.rejected}, lambda: metrics, force=force)
+
+    while not stopping.is_set():
+        now = clock()
+        for wish in ordered:
+            state = order(state, wish)
+        offered = source.poll(now)
+        if ordered or has_news(state, offered) or now >= repeat_ns(state):
+            state, sample = make_sample(state, offered, now, finished=source.finished)
+            publish(encode(sample))
+        report("running")
+        wake_ns = min(source.next_ns(now), repeat_ns(state))
+        ordered = wait((wake_ns - clock()) / NS_PER_S)
+    report("ending", force=True)

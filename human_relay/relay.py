@@ -1,0 +1,146 @@
+"""The relay's core: what the source offers plus what the operator orders, made into the next hand sample.
+
+Pure: the state is passed in and returned, and so is the time. The wish in a sample is the strongest of the
+source's, the operator's and the relay's own, with STOP > LAND > HOLD > whatever the source says.
+"""
+
+import math
+
+import numpy as np
+from attrs import evolve, field, frozen
+
+from human_relay.sources.base import HandPose
+from human_relay.velocity import VelocityState, step
+from shared.clock import NS_PER_S
+from shared.messages import MAX_POSITION, MAX_VELOCITY, NO_HAND, ORIGIN, HandSample, Vector, Wish
+from shared.topics import HAND
+
+PERIOD_NS = round(NS_PER_S / HAND.rate_hz)
+
+PATIENCE_NS = 5 * PERIOD_NS // 2
+"""Time without a new pose after which the last one is repeated: one lost frame is not worth a repeat."""
+
+STALE_NS = NS_PER_S // 10
+"""Age of the newest pose from which on the hand counts as being at rest."""
+
+MAX_YAW = 1_000.0
+"""Largest yaw that receivers accept, rad."""
+
+_STRENGTH = {Wish.FLY: 0, Wish.GROUND: 0, Wish.HOLD: 1, Wish.LAND: 2, Wish.STOP: 3}
+
+
+@frozen(kw_only=True)
+class RelayState:
+    """What the relay remembers.
+
+    Attributes:
+        epoch: Start of the process, ns.
+        seq: Number of the next sample, which is also the number of samples so far.
+        override: What the operator ordered; None leaves the wish to the source.
+        pose: Last good pose; None until the first.
+        velocity: Hand velocity at that pose, m/s.
+        estimator: State of the velocity estimator.
+        fresh_ns: When the last new pose was sent.
+        sent_ns: When the last sample was sent.
+        rejected: Samples in which the source's pose was replaced because it was impossible.
+    """
+
+    epoch: int
+    seq: int = 0
+    override: Wish | None = None
+    pose: HandPose | None = None
+    velocity: Vector = ORIGIN
+    estimator: VelocityState = field(factory=VelocityState)
+    fresh_ns: int = 0
+    sent_ns: int = 0
+    rejected: int = 0
+
+
+def order(state: RelayState, wish: Wish) -> RelayState:
+    """Takes an order of the operator.
+
+    STOP is final. LAND lasts until FLY. FLY lifts HOLD and LAND and gives the word back to the source.
+
+    Args:
+        state: The relay.
+        wish: FLY, HOLD, LAND or STOP.
+    """
+    if state.override is Wish.STOP:
+        return state
+    if wish is Wish.FLY:
+        return evolve(state, override=None)
+    return evolve(state, override=_strongest(wish, state.override))
+
+
+def has_news(state: RelayState, offered: HandPose | None) -> bool:
+    """Says whether the source offers a pose that has not been sent yet."""
+    return offered is not None and (state.pose is None or offered.t_ns > state.pose.t_ns)
+
+
+def repeat_ns(state: RelayState) -> int:
+    """Returns when a sample is due even if the source offers nothing new."""
+    return max(state.fresh_ns + PATIENCE_NS, state.sent_ns + PERIOD_NS)
+
+
+def make_sample(
+    state: RelayState, offered: HandPose | None, now_ns: int, *, finished: bool = False
+) -> tuple[RelayState, HandSample]:
+    """Makes the next sample.
+
+    Without a usable pose (released, not armed yet, impossible) the sample is the last good pose at rest with
+    the wish HOLD; before the first pose it says `NO_HAND`.
+
+    Args:
+        state: The relay.
+        offered: What the source returned.
+        now_ns: Clock of the process.
+        finished: Whether the source has ended; from then on the wish is at least LAND.
+
+    Returns:
+        The new state and the sample.
+    """
+    if offered is not None and _is_possible(state, offered):
+        state = _take(state, offered, now_ns)
+        wish = offered.mode
+    else:
+        impossible = offered is not None
+        state = evolve(state, velocity=ORIGIN, estimator=VelocityState(), rejected=state.rejected + impossible)
+        wish = Wish.HOLD
+    wish = _strongest(wish, state.override, Wish.LAND if finished else None)
+    pose = state.pose
+    sample = HandSample(
+        epoch=state.epoch,
+        seq=state.seq,
+        stamp_ns=now_ns,
+        position=pose.position if pose else NO_HAND,
+        velocity=state.velocity,
+        yaw=pose.yaw if pose else 0.0,
+        mode=wish,
+    )
+    # A STOP is final wherever it came from.
+    override = Wish.STOP if wish is Wish.STOP else state.override
+    return evolve(state, seq=state.seq + 1, sent_ns=now_ns, override=override), sample
+
+
+def _take(state: RelayState, offered: HandPose, now_ns: int) -> RelayState:
+    """Makes a possible pose the current one, or ages the current one if there is nothing new."""
+    if not has_news(state, offered):
+        is_stale = now_ns - offered.t_ns > STALE_NS
+        return evolve(state, velocity=ORIGIN) if is_stale else state
+    dt = (offered.t_ns - state.pose.t_ns) / NS_PER_S if state.pose else 0.0
+    estimator, velocity = step(state.estimator, np.array(offered.position), dt)
+    vx, vy, vz = velocity.tolist()
+    return evolve(state, pose=offered, velocity=(vx, vy, vz), estimator=estimator, fresh_ns=now_ns)
+
+
+def _is_possible(state: RelayState, offered: HandPose) -> bool:
+    """Whether receivers would accept the pose and a hand could have come there from the last good one."""
+    within = all(abs(x) <= MAX_POSITION for x in offered.position) and abs(offered.yaw) <= MAX_YAW
+    if not within or state.pose is None or not has_news(state, offered):
+        return within
+    way = math.dist(offered.position, state.pose.position)
+    return way <= MAX_VELOCITY * (offered.t_ns - state.pose.t_ns) / NS_PER_S
+
+
+def _strongest(*wishes: Wish | None) -> Wish:
+    return max((wish for wish in wishes if wish), key=_STRENGTH.__getitem__)

@@ -1,0 +1,50 @@
+"""Hand sources by URI: one row per backend, imported only when it is used."""
+
+import importlib
+from typing import cast
+
+from human_relay.sources.base import HandBackend, HandSource, SourceUri, parse_uri
+from shared.errors import ConfigError
+
+BACKENDS = {
+    "scripted": ("human_relay.sources.scripted", "ScriptedHand"),
+    "recording": ("human_relay.sources.recording", "RecordedHand"),
+}
+
+
+def open_source(uri: str, start_ns: int) -> HandSource:
+    """Opens a hand source.
+
+    Args:
+        uri: For example `scripted:tour` or `recording:flights/S2_visual_1?speed=0.5`.
+        start_ns: When the source's own time starts, on the clock of the process.
+
+    Raises:
+        ConfigError: Unknown scheme or option, or a file that is missing or wrong.
+    """
+    parsed = parse_uri(uri)
+    return _backend(parsed)(parsed, start_ns)
+
+
+def source_hints(uri: str) -> dict[str, object]:
+    """Returns what a source knows about the mapping from its hand to the formation.
+
+    Args:
+        uri: As for `open_source`; the source is not started.
+
+    Returns:
+        Dotted scenario keys and values, for example `{"hand.gain": 2.0}`; empty if it knows nothing.
+
+    Raises:
+        ConfigError: As for `open_source`.
+    """
+    parsed = parse_uri(uri)
+    return _backend(parsed).hints(parsed)
+
+
+def _backend(uri: SourceUri) -> HandBackend:
+    if uri.scheme not in BACKENDS:
+        known = ", ".join(f"{scheme}:" for scheme in BACKENDS)
+        raise ConfigError(f"{uri.text}: unknown hand source {uri.scheme!r}; known ones: {known}")
+    module, name = BACKENDS[uri.scheme]
+    return cast(HandBackend, getattr(importlib.import_module(module), name))

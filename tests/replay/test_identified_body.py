@@ -1,0 +1,93 @@
+"""The identified body, driven by the recorded set-points, against the real drones.
+
+Convention: zero-order hold of the set-points on their source stamps, start at the first set-point with the
+recorded pose, the velocity of the first 0.1 s and an empty integral; nothing is skipped. Per run: RMS of the
+horizontal distance over all samples of its three drones. Pooled over trial 2, later than 5 s after the start
+(the real integral at the start is unknown), it is 18.8 mm where DESIGN section 7 has 18.9.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from agents.vehicles.bodies.identified import step
+from agents.vehicles.bodies.pid import hovering
+from agents.vehicles.bodies.state import Command, Commands, Vec
+from shared.flight_folder import read_setpoints, read_track
+from tests.replay.flights import ABSENT, flight_folders
+
+SUBSTEP = 0.004
+START_SPAN = 6  # frames of 60 Hz
+
+
+class Flight(NamedTuple):
+    """One recorded drone: times from its first set-point (s), positions (n, 3), set-points."""
+
+    run: str
+    t: Vec
+    position: Vec
+    setpoint_t: Vec
+    setpoint: Vec
+
+
+def read_flight(folder: Path, drone: int) -> Flight:
+    track, setpoints = (
+        read_track(folder / f"cf{drone}.csv.gz"),
+        read_setpoints(folder / f"cf{drone}_sp.csv.gz"),
+    )
+    first = int(np.searchsorted(track.t_ns, setpoints.t_ns[0]))
+    last = int(np.searchsorted(track.t_ns, setpoints.t_ns[-1]))
+    t0 = track.t_ns[first]
+    return Flight(
+        folder.name,
+        (track.t_ns[first:last] - t0) / 1e9,
+        track.position[first:last],
+        (setpoints.t_ns - t0) / 1e9,
+        setpoints.position,
+    )
+
+
+def fly_all(flights: list[Flight]) -> list[Vec]:
+    """Flies all bodies at once; returns (n, 2) horizontal positions at each flight's own times."""
+    state = hovering(np.array([f.position[0] for f in flights]))
+    velocity = np.array([(f.position[START_SPAN] - f.position[0]) / f.t[START_SPAN] for f in flights])
+    state = state._replace(velocity=velocity)
+    times = np.arange(0.0, max(f.t[-1] for f in flights) + SUBSTEP, SUBSTEP)
+    held = np.stack([_hold(f, times) for f in flights], axis=1)
+    kind = np.full(len(flights), Command.FLY, dtype=np.int8)
+    flown = np.empty((len(times), len(flights), 2))
+    for k in range(len(times)):
+        flown[k] = state.position[:, :2]
+        state = step(state, Commands(kind, held[k]), SUBSTEP)
+    return [
+        np.column_stack([np.interp(f.t, times, flown[:, row, axis]) for axis in (0, 1)])
+        for row, f in enumerate(flights)
+    ]
+
+
+def _hold(flight: Flight, times: Vec) -> Vec:
+    rows = np.searchsorted(flight.setpoint_t, times, side="right") - 1
+    return flight.setpoint[np.clip(rows, 0, None)]
+
+
+def rms_by_run(runs: list[str], errors: list[Vec]) -> dict[str, float]:
+    pooled = {run: np.concatenate([e for e, r in zip(errors, runs, strict=True) if r == run]) for run in runs}
+    return {run: float(np.sqrt((e**2).sum(axis=1).mean())) for run, e in pooled.items()}
+
+
+def test_identified_body_follows_the_real_drones(record_property: Callable[[str, object], None]) -> None:
+    flights = [read_flight(folder, drone) for folder in flight_folders() for drone in (1, 2, 3)]
+    if not flights:
+        pytest.skip(ABSENT)
+    errors = [flown - f.position[:, :2] for flown, f in zip(fly_all(flights), flights, strict=True)]
+    lags = [_hold(f, f.t)[:, :2] - f.position[:, :2] for f in flights]
+    runs = [f.run for f in flights]
+    by_run, lag_by_run = rms_by_run(runs, errors), rms_by_run(runs, lags)
+    for run, value in by_run.items():
+        record_property(f"{run}_rms_mm", round(1e3 * value, 2))
+        print(f"{run}: {1e3 * value:.1f} mm, set-points themselves {1e3 * lag_by_run[run]:.1f} mm")
+    assert np.mean([value for run, value in by_run.items() if run.endswith("_2")]) <= 0.022, by_run
+    assert all(by_run[run] < 0.5 * lag_by_run[run] for run in by_run), (by_run, lag_by_run)
