@@ -13,7 +13,7 @@ from shared.config import load_scenario, vehicle_settings
 from shared.errors import SwarmTouchError
 from shared.formation import build_formation
 from shared.nodes import dials, drone_node, endpoint
-from shared.process import StatusReporter, prepare_process
+from shared.process import StatusReporter, explain, prepare_process
 from shared.topics import DRONE_STATE
 from shared.transport import Inbox
 
@@ -37,8 +37,7 @@ def main() -> int:
             adminspace=scenario.net.adminspace,
         )
     except SwarmTouchError as error:
-        print(f"agents: {error}", file=sys.stderr)
-        return 2
+        return explain("agents", error)
     inbox = Inbox(clock)
     with bus:
         for key in agent.senses.keys:

@@ -16,6 +16,9 @@ from shared.transport import Inbox, Publish
 LONGEST_WAIT = 0.05
 """The loop looks at the stop event and the clock at least this often, s."""
 
+POSE_WAIT = 0.01
+"""A vehicle that has not reported yet is asked again after this long, s."""
+
 _log = logging.getLogger("agent")
 
 
@@ -61,12 +64,15 @@ def run(
     mode: Mode | None = None
     while not stopping.is_set():
         agent.receive(inbox.take())
+        status.tick(agent.steps, "running" if agent.steps else "starting", agent.senses.rejected)
         now = clock()
-        seen = poses.read(now)
         wait = (agent.due_ns(now) - now) / NS_PER_S
-        status.tick(agent.steps, "running" if seen else "starting", agent.senses.rejected)
-        if seen is None or wait > 0:
-            inbox.wait(min(max(wait, 0.001), LONGEST_WAIT))
+        if wait > 0:
+            inbox.wait(min(wait, LONGEST_WAIT))
+            continue
+        seen = poses.read(now)
+        if seen is None:
+            inbox.wait(POSE_WAIT)
             continue
         state = agent.step(now, *seen)
         command(vehicle, state)

@@ -13,7 +13,7 @@ from shared.config import load_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import build_formation
 from shared.nodes import RELAY, dials, endpoint
-from shared.process import prepare_process
+from shared.process import explain, prepare_process
 
 _EXAMPLE = """example: python -m human_relay --scenario rhombus --hand "scripted:tour?peak=0.4"
 Orders are lines on standard input: fly, hold, land, stop (stop is final)."""
@@ -35,8 +35,7 @@ def main() -> int:
             orders = OrderReader(sys.stdin.fileno() if sys.stdin else None)
             run(source, orders.wait, bus, clock, stopping)
     except SwarmTouchError as error:
-        print(f"relay: {error}", file=sys.stderr)
-        return 2
+        return explain("relay", error)
     return 0
 
 

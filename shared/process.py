@@ -12,12 +12,16 @@ from collections.abc import Callable
 
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
+from shared.errors import ConfigError, SwarmTouchError
 from shared.messages import ProcessStatus
 from shared.topics import STATUS
 from shared.transport import Bus
 
 LAUNCHER_PID = "SWARMTOUCH_LAUNCHER_PID"
 """Environment variable by which a launcher asks its children to die with it."""
+
+EXIT_FAILED = 1
+EXIT_REFUSED = 2
 
 _PR_SET_PDEATHSIG = 1
 _SWITCH_INTERVAL_S = 0.0005
@@ -48,6 +52,16 @@ def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
     if launcher:
         _die_with(int(launcher))
     return stopping
+
+
+def explain(program: str, error: SwarmTouchError) -> int:
+    """Says on stderr why a process cannot run, and returns its exit code.
+
+    Returns:
+        2 if the configuration is refused (starting again will not help), else 1.
+    """
+    print(f"{program}: {error}", file=sys.stderr)
+    return EXIT_REFUSED if isinstance(error, ConfigError) else EXIT_FAILED
 
 
 class ResourceMeter:

@@ -53,9 +53,10 @@ class RecordedHand(Playback):
         `hand.home` is where that law puts the first hand position, before any obstacle.
 
         Raises:
-            ConfigError: A file of the folder is missing or wrong.
+            ConfigError: There is nothing at the path, or a file of the folder is missing or wrong.
         """
         path = _path(uri)
+        _check_exists(path)
         if not path.is_dir():
             return {}
         meta, obstacles = read_meta(path), read_obstacles(path)
@@ -81,18 +82,22 @@ def read_recording(path: Path, topic: str = BAG_TOPIC) -> Track:
     Raises:
         ConfigError: There is nothing, or nothing readable, at the path.
     """
+    _check_exists(path)
     if path.is_dir():
         return read_track(path / HAND_FILE)
-    if not path.exists():
-        raise ConfigError(
-            f"{path.absolute()}: no such recording; expected a flight folder, a .bag file"
-            " or a CSV file with the header t,x,y,z[,yaw]"
-        )
     if path.suffix == ".bag":
         from human_relay.sources.ros_bag import read_bag  # noqa: PLC0415  rosbags is an optional extra
 
         return read_bag(path, topic)
     return read_csv(path)
+
+
+def _check_exists(path: Path) -> None:
+    if not path.exists():
+        raise ConfigError(
+            f"{path.absolute()}: no such recording; expected a flight folder, a .bag file"
+            " or a CSV file with the header t,x,y,z[,yaw]"
+        )
 
 
 def read_csv(path: Path) -> Track:

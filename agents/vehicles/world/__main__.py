@@ -15,7 +15,7 @@ from shared.clock import system_clock
 from shared.config import load_scenario
 from shared.errors import SwarmTouchError
 from shared.nodes import WORLD, dials, endpoint
-from shared.process import StatusReporter, prepare_process
+from shared.process import StatusReporter, explain, prepare_process
 
 
 def main() -> int:
@@ -39,8 +39,7 @@ def main() -> int:
         connect = dials(scenario, setup.formation, WORLD)
         bus = ZenohBus(scenario.swarm.name, listen, connect, adminspace=scenario.net.adminspace)
     except SwarmTouchError as error:
-        print(f"world: {error}", file=sys.stderr)
-        return 2
+        return explain("world", error)
     clock = system_clock()
     with radio, bus, RefereeFile(arguments.run_dir) as report:
         hand, status = HandWatch(bus, clock), StatusReporter(bus, WORLD, 0, clock)

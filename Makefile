@@ -1,0 +1,48 @@
+# SwarmTouch needs Python >= 3.11, make and a package registry. Everything else is brought along into .bootstrap/
+# and .venv/; nothing outside this folder changes.
+
+export UV_PYTHON_DOWNLOADS := never
+export UV_PYTHON_PREFERENCE := only-system
+
+UV := .bootstrap/uv
+BIN := .venv/bin
+RUNTIME := .venv/.runtime
+DEVELOPMENT := .venv/.development
+
+.PHONY: help demo env test check lint clean
+
+help:  ## list what can be made
+	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
+
+demo: $(RUNTIME)  ## fly the paper's rhombus for 30 s, simulated, one process per drone
+	$(BIN)/swarmtouch up rhombus --seconds 30
+
+env: $(DEVELOPMENT)  ## set up everything that developing needs in .venv/
+
+test: lint  ## everything CI runs: format, lint, types, import contracts, all tests
+	$(BIN)/pytest -m "not chip and not browser and not container"
+
+check: lint  ## the quick gate: format, lint, types, import contracts, unit tests
+	$(BIN)/pytest tests/unit
+
+lint: $(DEVELOPMENT)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+clean:  ## remove what was set up and cached; flights in runs/ stay
+	rm -rf .bootstrap .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# --inexact: flying never removes the tools of an environment for development.
+$(RUNTIME): pyproject.toml uv.lock | $(UV)
+	$(UV) sync --frozen --no-dev --inexact
+	@touch $@
+
+$(DEVELOPMENT): pyproject.toml uv.lock | $(UV)
+	$(UV) sync --frozen
+	@touch $@ $(RUNTIME)
+
+$(UV):
+	sh deploy/bootstrap.sh $@

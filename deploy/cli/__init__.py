@@ -1,0 +1,75 @@
+"""The command line: `swarmtouch COMMAND`; one module per command, its heavy imports wait until it runs."""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from typing import Protocol, cast
+
+from shared.errors import ConfigError, SwarmTouchError
+
+COMMANDS = {
+    "up": "fly a scenario with real processes on this machine",
+    "scenarios": "list the scenarios that ship",
+}
+"""Command -> one line; the module has the command's name."""
+
+EXIT_FAILED = 1
+EXIT_REFUSED = 2
+
+
+class Command(Protocol):
+    """What the module of a command offers; heavy imports happen in `run`."""
+
+    DESCRIPTION: str
+    EXAMPLE: str
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declares the arguments."""
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Does it and returns the exit code."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command.
+
+    Args:
+        argv: Arguments without the program's name, `sys.argv[1:]` by default.
+
+    Returns:
+        The exit code: 0 all went well, 1 it did not, 2 refused before anything started.
+    """
+    arguments = _parser().parse_args(argv)
+    try:
+        return _load(arguments.command).run(arguments)
+    except ConfigError as error:
+        print(f"swarmtouch: {error}", file=sys.stderr)
+        return EXIT_REFUSED
+    except SwarmTouchError as error:
+        print(f"swarmtouch: {error}", file=sys.stderr)
+        return EXIT_FAILED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="swarmtouch",
+        description="Guide a formation of small drones with one hand.",
+        epilog="example: swarmtouch up rhombus --seconds 30",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, summary in COMMANDS.items():
+        command = _load(name)
+        child = commands.add_parser(
+            name,
+            help=summary,
+            description=command.DESCRIPTION,
+            epilog=f"example: {command.EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.add_arguments(child)
+    return parser
+
+
+def _load(name: str) -> Command:
+    return cast(Command, importlib.import_module(f"deploy.cli.{name}"))

@@ -1,0 +1,128 @@
+"""From what the user asked for to a flight and its summary."""
+
+import asyncio
+import json
+from pathlib import Path
+
+from attrs import frozen
+from rich.console import Console
+
+from deploy.launcher.console import open_console
+from deploy.launcher.flight import Flight, Outcome
+from deploy.launcher.monitor import Monitor
+from deploy.launcher.ports import free_ports
+from deploy.launcher.process_table import hint_overrides, process_table, resolve_scenario
+from deploy.launcher.run_directory import create_run_directory
+from deploy.launcher.status_view import StatusView
+from deploy.launcher.summary import Json, flight_summary, print_summary
+from human_relay.sources import open_source, source_hints
+from shared.bus import ZenohBus
+from shared.clock import system_clock
+from shared.config import dump_scenario, load_scenario
+from shared.errors import ConfigError
+from shared.formation import Formation, build_formation
+from shared.nodes import OBSERVER, all_nodes, dials, endpoint
+from shared.scenario import Scenario
+
+SCENARIO_FILE = "scenario.toml"
+SUMMARY_FILE = "summary.json"
+
+
+@frozen(kw_only=True)
+class Options:
+    """What the user asks for.
+
+    Attributes:
+        scenario: Name or file.
+        hand: URI of the hand source.
+        seconds: Length of the flight, None until the hand ends it.
+        overrides: `key=value` items for the scenario.
+        runs: Directory of all runs.
+        json: Whether the summary goes to stdout as one line of JSON and everything else to stderr.
+        live: Whether a terminal gets a live table.
+        verbose: Whether the processes log debugging details.
+    """
+
+    scenario: str
+    hand: str
+    seconds: float | None
+    overrides: tuple[str, ...] = ()
+    runs: Path = Path("runs")
+    json: bool = False
+    live: bool = True
+    verbose: bool = False
+
+
+def launch(options: Options) -> Json:
+    """Flies once.
+
+    Args:
+        options: What the user asks for.
+
+    Returns:
+        The summary (`deploy.launcher.summary`), which has also been printed and written to the run directory.
+
+    Raises:
+        ConfigError: The scenario or the hand is refused; nothing has been started.
+        DeviceError: The bus cannot be opened.
+    """
+    scenario, formation = _resolve(options)
+    run_dir = create_run_directory(options.runs)
+    file = run_dir / SCENARIO_FILE
+    file.write_text(dump_scenario(scenario), encoding="utf-8")
+    console = open_console(stderr=options.json)
+    outcome, summary = asyncio.run(_fly(options, scenario, formation, run_dir, console))
+    line = json.dumps(summary)
+    (run_dir / SUMMARY_FILE).write_text(f"{line}\n", encoding="utf-8")
+    print_summary(summary, console)
+    if outcome.refused:
+        raise ConfigError(_refusal(outcome, run_dir))
+    if options.json:
+        print(line, flush=True)
+    return summary
+
+
+def _resolve(options: Options) -> tuple[Scenario, Formation]:
+    open_source(options.hand, start_ns=0).close()  # what it refuses is refused before anything starts
+    hints = hint_overrides(source_hints(options.hand))
+    scenario = load_scenario(options.scenario, (*hints, *options.overrides))
+    formation = build_formation(scenario, options.scenario)
+    tcp_ports, (udp_port,) = free_ports(tcp=len(all_nodes(formation)), udp=1)
+    return resolve_scenario(scenario, formation, tcp_ports, udp_port), formation
+
+
+async def _fly(
+    options: Options, scenario: Scenario, formation: Formation, run_dir: Path, console: Console
+) -> tuple[Outcome, Json]:
+    listen, connect = endpoint(scenario, formation, OBSERVER), dials(scenario, formation, OBSERVER)
+    rows = process_table(
+        scenario,
+        formation,
+        file=run_dir / SCENARIO_FILE,
+        hand=options.hand,
+        run_dir=run_dir,
+        verbose=options.verbose,
+    )
+    live = options.live and console.is_terminal
+    with (
+        ZenohBus(scenario.swarm.name, listen, connect) as bus,
+        StatusView(console, run_dir, live=live) as view,
+    ):
+        monitor = Monitor(bus, formation, system_clock())
+        flight = Flight(
+            formation=formation,
+            rows=rows,
+            monitor=monitor,
+            run_dir=run_dir,
+            seconds=options.seconds,
+            view=view,
+        )
+        outcome = await flight.run()
+    return outcome, flight_summary(outcome, monitor)
+
+
+def _refusal(outcome: Outcome, run_dir: Path) -> str:
+    """Says why a process refused to start, in its own last words."""
+    name = outcome.refused[0]
+    lines = (run_dir / "logs" / f"{name}.log").read_text(encoding="utf-8", errors="replace").splitlines()
+    return f"{name} refused to start: {lines[-1] if lines else 'it left no message'}"

@@ -1,0 +1,115 @@
+"""What the launcher hears of the flight: decodes, feeds the statistics, remembers who is there."""
+
+from collections import Counter
+from typing import TypeVar
+
+from observer.flight_stats import FlightStats
+from shared.clock import Clock
+from shared.codec import decode
+from shared.errors import DecodeError
+from shared.formation import Formation
+from shared.messages import DroneState, HandSample, Message, Mode, ProcessStatus, Wish
+from shared.topics import DRONE_STATE, HAND, STATUS, topic_of
+from shared.transport import Arrival, Bus, Inbox
+
+INBOX_DEPTH = 4096
+"""Samples kept per key between two drains: a minute of them, so that the statistics miss none."""
+_ON_THE_GROUND = (Mode.GROUND, Mode.STOP)
+
+M = TypeVar("M", bound=Message)
+
+
+class Monitor:
+    """Listens to hand, states, health and presence; says nothing.
+
+    Args:
+        bus: The observer's connection to the swarm.
+        formation: The formation that flies.
+        clock: The launcher's clock.
+    """
+
+    def __init__(self, bus: Bus, formation: Formation, clock: Clock) -> None:
+        self.stats = FlightStats(formation)
+        self.present: set[str] = set()
+        self.health: dict[str, Health] = {}
+        self.rejected: Counter[str] = Counter()
+        self._ids = formation.ids
+        self._inbox = Inbox(clock, INBOX_DEPTH)
+        for topic in (HAND, DRONE_STATE, STATUS):
+            bus.subscribe(topic.wildcard, self._inbox)
+        bus.watch_presence(self._presence_changed)
+
+    def drain(self) -> None:
+        """Takes everything that has arrived; call it at 20 Hz or more."""
+        hands: list[HandSample] = []
+        states: list[DroneState] = []
+        for key, arrivals in self._inbox.take().items():
+            topic = topic_of(key)
+            if topic is HAND:
+                hands += self._decoded(arrivals, HandSample)
+            elif topic is DRONE_STATE:
+                states += (s for s in self._decoded(arrivals, DroneState) if key == DRONE_STATE.key(id=s.id))
+            else:
+                for status in self._decoded(arrivals, ProcessStatus):
+                    self.health.setdefault(f"{status.role}/{status.id}", Health()).add(status)
+        self.stats.update(hands, states)
+
+    @property
+    def all_down(self) -> bool:
+        """Whether no drone is known to be in the air."""
+        return all(state.mode in _ON_THE_GROUND for state in self.stats.latest.values())
+
+    @property
+    def all_landed(self) -> bool:
+        """Whether every drone has been heard and is on the ground, not by an emergency stop."""
+        modes = [state.mode for state in self.stats.latest.values()]
+        return len(modes) == len(self._ids) and all(mode is Mode.GROUND for mode in modes)
+
+    @property
+    def ended_by_hand(self) -> bool:
+        """Whether the hand itself has ended the flight and everybody is down."""
+        hand = self.stats.hand
+        return hand is not None and hand.mode in (Wish.LAND, Wish.STOP) and self.all_down
+
+    def _decoded(self, arrivals: list[Arrival], kind: type[M]) -> list[M]:
+        messages: list[M] = []
+        for arrival in arrivals:
+            try:
+                messages.append(decode(arrival.payload, kind))
+            except DecodeError as error:
+                self.rejected[error.reason] += 1
+        return messages
+
+    def _presence_changed(self, token: str, present: bool) -> None:
+        """Called by the bus, on its thread: single set operations only."""
+        if present:
+            self.present.add(token)
+        else:
+            self.present.discard(token)
+
+
+class Health:
+    """The newest status of one process, its mean CPU and largest memory over the flight.
+
+    Attributes:
+        status: The newest status, None before the first.
+        rss_mb: Largest resident memory, MB.
+    """
+
+    def __init__(self) -> None:
+        self.status: ProcessStatus | None = None
+        self.rss_mb = 0.0
+        self._cpu_sum, self._cpu_count = 0.0, 0
+
+    def add(self, status: ProcessStatus) -> None:
+        """Takes the next status."""
+        self.status = status
+        self.rss_mb = max(self.rss_mb, status.rss_mb)
+        if status.seq > 0:  # the first of an epoch covers the start-up
+            self._cpu_sum += status.cpu
+            self._cpu_count += 1
+
+    @property
+    def cpu(self) -> float:
+        """Mean fraction of one core."""
+        return self._cpu_sum / self._cpu_count if self._cpu_count else 0.0

@@ -1,0 +1,130 @@
+"""The process table: one row per process of a flight, derived from the scenario."""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+from attrs import frozen
+
+from shared.config import vehicle_settings
+from shared.formation import Formation
+from shared.nodes import all_nodes
+from shared.scenario import Scenario
+
+WORLD = "world"
+DRONE = "drone"
+RELAY = "relay"
+
+
+@frozen(kw_only=True)
+class ProcessRow:
+    """One process.
+
+    Attributes:
+        role: Role as in its liveliness token.
+        number: Number within the role, 0 for single ones.
+        command: Command line.
+        restarts: Whether it is started again when it ends without being asked to.
+        takes_orders: Whether it reads the operator's orders, line by line, from its standard input.
+    """
+
+    role: str
+    number: int
+    command: tuple[str, ...]
+    restarts: bool = True
+    takes_orders: bool = False
+
+    @property
+    def token(self) -> str:
+        """What it announces itself as, for example `drone/2`."""
+        return f"{self.role}/{self.number}"
+
+    @property
+    def name(self) -> str:
+        """Its name for people and files, for example `drone-2`."""
+        return f"{self.role}-{self.number}" if self.number else self.role
+
+
+def process_table(
+    scenario: Scenario, formation: Formation, *, file: Path, hand: str, run_dir: Path, verbose: bool = False
+) -> tuple[ProcessRow, ...]:
+    """Derives the processes of a flight on this machine, in the order in which they start.
+
+    Args:
+        scenario: The resolved scenario.
+        formation: Its formation.
+        file: Where the resolved scenario lies.
+        hand: URI of the hand source.
+        run_dir: Directory of this run.
+        verbose: Whether the processes log debugging details.
+
+    Returns:
+        The world (if a vehicle is simulated), one agent per drone, and the relay last: a hand may only begin
+        to move when everybody listens.
+    """
+    common = ("--scenario", str(file), *(("-v",) if verbose else ()))
+    agents = tuple(
+        ProcessRow(role=DRONE, number=i, command=_python("agents", *common, "--id", str(i)))
+        for i in formation.ids
+    )
+    world = ProcessRow(
+        role=WORLD, number=0, command=_python("agents.vehicles.world", *common, "--run-dir", str(run_dir))
+    )
+    relay = ProcessRow(
+        role=RELAY, number=0, command=_python("human_relay", *common, "--hand", hand), takes_orders=True
+    )
+    simulated = any((vehicle_settings(scenario, i).uri or "").startswith("sim:") for i in formation.ids)
+    return (*((world,) if simulated else ()), *agents, relay)
+
+
+def resolve_scenario(
+    scenario: Scenario, formation: Formation, tcp_ports: Sequence[int], udp_port: int
+) -> Scenario:
+    """Fills in the addresses that the scenario leaves open.
+
+    Args:
+        scenario: The scenario as loaded.
+        formation: Its formation.
+        tcp_ports: A free port on loopback for every node of `all_nodes(formation)`.
+        udp_port: A free port on loopback for the simulated world.
+
+    Returns:
+        The scenario with an endpoint for every node and an address for the vehicles; what it names stays.
+    """
+    free = {node: f"tcp/127.0.0.1:{port}" for node, port in zip(all_nodes(formation), tcp_ports, strict=True)}
+    everyone = scenario.vehicles.all
+    uri = everyone.uri or f"sim://127.0.0.1:{udp_port}/{{id}}"
+    return attrs.evolve(
+        scenario,
+        net=attrs.evolve(scenario.net, endpoints={**free, **scenario.net.endpoints}),
+        vehicles=attrs.evolve(scenario.vehicles, all=attrs.evolve(everyone, uri=uri)),
+    )
+
+
+def hint_overrides(hints: Mapping[str, Any]) -> list[str]:
+    """Turns what a hand source knows about its mapping into `--set` items.
+
+    Args:
+        hints: Dotted scenario keys and their values.
+
+    Returns:
+        `key=value` items for `load_scenario`.
+    """
+    return [f"{key}={_toml(value)}" for key, value in hints.items()]
+
+
+def _toml(value: Any) -> str:
+    """Writes a value inline; what is not a table or list looks the same in JSON."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value)
+
+
+def _python(module: str, *arguments: str) -> tuple[str, ...]:
+    # -P: a folder `agents` in the user's working directory must not shadow ours.
+    return (sys.executable, "-P", "-m", module, *arguments)

@@ -1,0 +1,141 @@
+"""What is left of a flight: the JSON contract of `swarmtouch up` and the printed tables."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import attrs
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from deploy.launcher.flight import Outcome
+from deploy.launcher.monitor import Monitor
+from deploy.launcher.process_table import DRONE
+from observer.agent_log import AgentSummary
+
+Json = dict[str, Any]
+
+
+def flight_summary(outcome: Outcome, monitor: Monitor) -> Json:
+    """Puts the numbers of a flight together.
+
+    Args:
+        outcome: How the flight went.
+        monitor: What was heard of it.
+
+    Returns:
+        The JSON contract: `ok` (no unexpected exit, all landed, and by the referee no collision and no fence
+        exit), `seconds`, `restarts`, the referee's `min_distance_m`, `min_hand_distance_m`, `collisions`,
+        `fence_exits` (null without a simulated world), `agents` with `id, steps, rate_hz, on_time, hand_used,
+        tracking_rms_m, latency_ms {p50, p99}, cpu, rss_mb` each; and beyond the contract `landed`,
+        `formation` and, per agent, `lateness_ms`, `missed` and `restarts`.
+    """
+    referee = outcome.referee
+    formation = attrs.asdict(monitor.stats.formation())
+    return {
+        "ok": _went_well(outcome),
+        "seconds": outcome.seconds,
+        "restarts": sum(outcome.restarts.values()),
+        "landed": outcome.landed,
+        "min_distance_m": referee.get("min_distance_m"),
+        "min_hand_distance_m": referee.get("min_hand_distance_m"),
+        "collisions": _count(referee, "collisions"),
+        "fence_exits": _count(referee, "fence_exits"),
+        "agents": [_agent(agent, outcome, monitor) for agent in monitor.stats.agents()],
+        "formation": formation,
+    }
+
+
+def print_summary(summary: Json, console: Console) -> None:
+    """Prints the tables that the operator reads after a flight."""
+    console.print(_agent_table(summary["agents"]))
+    if summary["formation"]["area_m2"]:
+        console.print(_formation_table(summary["formation"]))
+    console.print(_referee_table(summary))
+
+
+def _went_well(outcome: Outcome) -> bool:
+    contacts = sum(outcome.referee.get(name, 0) for name in ("collisions", "fence_exits"))
+    return outcome.landed and not outcome.unexpected_exits and contacts == 0
+
+
+def _count(referee: Mapping[str, float], name: str) -> int | None:
+    return int(referee[name]) if name in referee else None
+
+
+def _agent(agent: AgentSummary, outcome: Outcome, monitor: Monitor) -> Json:
+    token = f"{DRONE}/{agent.id}"
+    health = monitor.health.get(token)
+    return {
+        "id": agent.id,
+        "steps": agent.steps,
+        "missed": agent.missed,
+        "rate_hz": agent.rate_hz,
+        "on_time": agent.on_time,
+        "hand_used": agent.hand_used,
+        "lateness_ms": agent.lateness_ms._asdict(),
+        "tracking_rms_m": agent.tracking_rms_m,
+        "latency_ms": agent.latency_ms._asdict(),
+        "restarts": outcome.restarts.get(token, 0),
+        "cpu": health.cpu if health else 0.0,
+        "rss_mb": health.rss_mb if health else 0.0,
+    }
+
+
+def _agent_table(agents: Iterable[Json]) -> Table:
+    table = _table(
+        "agents (times in ms: p50 / p99)",
+        *("id", "steps", "Hz", "on time", "lateness", "hand used", "RMS m", "latency", "cpu", "MB"),
+    )
+    for agent in agents:
+        table.add_row(
+            str(agent["id"]),
+            str(agent["steps"]),
+            f"{agent['rate_hz']:.1f}",
+            f"{agent['on_time']:.1%}",
+            _quantiles(agent["lateness_ms"]),
+            f"{agent['hand_used']:.1%}",
+            _number(agent["tracking_rms_m"]),
+            _quantiles(agent["latency_ms"]),
+            f"{agent['cpu']:.0%}",
+            f"{agent['rss_mb']:.0f}",
+        )
+    return table
+
+
+def _formation_table(formation: Json) -> Table:
+    table = _table("formation", "", "mean", "min", "max")
+    table.add_row("area, m2", *_spread(formation["area_m2"]))
+    for pair, spread in formation["distances_m"].items():
+        table.add_row(f"distance {pair}, m", *_spread(spread))
+    return table
+
+
+def _referee_table(summary: Json) -> Table:
+    table = _table("referee", "", "")
+    table.add_row("smallest distance between drones, m", _number(summary["min_distance_m"]))
+    table.add_row("smallest distance to the hand, m", _number(summary["min_hand_distance_m"]))
+    table.add_row("collisions", _number(summary["collisions"], 0))
+    table.add_row("fence exits", _number(summary["fence_exits"], 0))
+    table.add_row("restarts", str(summary["restarts"]))
+    table.add_row("landed", "yes" if summary["landed"] else "no")
+    return table
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0, show_header=any(columns))
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="right" if index else "left", no_wrap=True)
+    return table
+
+
+def _spread(spread: Json) -> tuple[str, ...]:
+    return tuple(_number(spread[name]) for name in ("mean", "min", "max"))
+
+
+def _quantiles(quantiles: Json) -> str:
+    return " / ".join(_number(quantiles[name], 1) for name in ("p50", "p99"))
+
+
+def _number(value: float | None, digits: int = 3) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,1 @@
+"""Listens to everything, commands nothing: trace, live view, statistics, report."""

@@ -1,0 +1,248 @@
+"""What the operator reads: the live table, the plain lines and the summary."""
+
+import io
+import json
+from pathlib import Path
+from typing import TextIO, cast
+
+import pytest
+from rich.console import Console
+
+from deploy.launcher.console import open_console
+from deploy.launcher.flight import GRACE_S, INTERRUPTED_LANDING_S, Outcome
+from deploy.launcher.monitor import Monitor
+from deploy.launcher.status_view import SUMMARISE_ABOVE, AgentRow, plain_lines, status_table
+from deploy.launcher.summary import flight_summary, print_summary
+from shared.clock import system_clock
+from shared.codec import encode
+from shared.config import load_scenario
+from shared.formation import build_formation
+from shared.memory_bus import MemoryBus, MemoryNetwork
+from shared.messages import ORIGIN, DroneState, Flag, HandSample, Heard, Mode, ProcessStatus, Wish
+from shared.topics import DRONE_STATE, HAND, STATUS
+
+FORMATION = build_formation(load_scenario("rhombus"))
+NO_FLAGS = Flag(0)
+REFEREE = {"collisions": 0.0, "fence_exits": 0.0, "min_distance_m": 0.5, "min_hand_distance_m": 0.4}
+
+
+def state(drone: int, mode: Mode = Mode.GROUND, *, seq: int = 0, flags: Flag = NO_FLAGS) -> DroneState:
+    return DroneState(
+        epoch=1,
+        seq=seq,
+        stamp_ns=2_000_000 + seq,
+        step_ns=2_000_000 + seq,
+        id=drone,
+        position=(0.5 * drone, 0.0, 1.23),
+        velocity=ORIGIN,
+        goal=(0.5 * drone, 0.3, 1.23),
+        goal_velocity=ORIGIN,
+        setpoint=ORIGIN,
+        mode=mode,
+        flags=flags,
+        heard={"human/hand": Heard(1, 0, 1_500_000)},
+    )
+
+
+def status(drone: int, *, seq: int = 1, cpu: float = 0.2, rejected: int = 0) -> ProcessStatus:
+    return ProcessStatus(
+        epoch=1,
+        seq=seq,
+        stamp_ns=1,
+        role="drone",
+        id=drone,
+        pid=7,
+        host="here",
+        state="running",
+        rate_hz=60.0,
+        cpu=cpu,
+        rss_mb=50.0 + seq,
+        rejected={"malformed": rejected} if rejected else {},
+    )
+
+
+def hand(mode: Wish = Wish.FLY) -> HandSample:
+    return HandSample(epoch=1, seq=0, stamp_ns=1_000_000, position=ORIGIN, velocity=ORIGIN, yaw=0.0, mode=mode)
+
+
+def outcome(**changes: object) -> Outcome:
+    fields = {
+        "seconds": 3.0,
+        "unexpected_exits": {},
+        "restarts": {"drone/1": 0},
+        "landed": True,
+        "refused": (),
+        "referee": REFEREE,
+    }
+    return Outcome(**(fields | changes))  # type: ignore[arg-type]
+
+
+class Swarm:
+    """A monitor, and the swarm that it listens to."""
+
+    def __init__(self) -> None:
+        network = MemoryNetwork()
+        self.bus = MemoryBus(network)
+        self.monitor = Monitor(MemoryBus(network), FORMATION, system_clock())
+
+    def say(self, *messages: HandSample | DroneState | ProcessStatus) -> Monitor:
+        for message in messages:
+            match message:
+                case HandSample():
+                    self.bus.publisher(HAND)(encode(message))
+                case DroneState():
+                    self.bus.publisher(DRONE_STATE, id=message.id)(encode(message))
+                case ProcessStatus():
+                    self.bus.publisher(STATUS, role=message.role, id=message.id)(encode(message))
+        self.monitor.drain()
+        return self.monitor
+
+
+def rendered(renderable: object, width: int = 80) -> str:
+    console = Console(file=io.StringIO(), width=width)
+    console.print(renderable)
+    return cast(io.StringIO, console.file).getvalue()
+
+
+def well(drone: int) -> AgentRow:
+    return AgentRow(id=drone, alive=True, state=state(drone, Mode.FOLLOW), status=status(drone))
+
+
+def ill(drone: int) -> AgentRow:
+    flagged = state(drone, Mode.HOLD, flags=Flag.FENCE | Flag.HAND_STALE)
+    return AgentRow(id=drone, alive=True, restarts=2, state=flagged, status=status(drone), latency_ms=12.3)
+
+
+def test_the_live_table_shows_every_agent_within_80_columns() -> None:
+    text = rendered(status_table([well(1), ill(2), AgentRow(id=3)], "flying", "hint"))
+    lines = text.splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    assert "FOLLOW 1.23 m     0.30 m       - 60 Hz        0        0 20%" in text
+    assert "12.3 ms" in text
+    assert "fence hand_stale" in " ".join(text.split())
+    assert "absent" in text
+
+
+def test_a_large_swarm_is_summarised_and_its_unhealthy_agents_listed() -> None:
+    rows = [well(drone) for drone in range(1, SUMMARISE_ABOVE + 1)] + [ill(77)]
+    text = rendered(status_table(rows, "flying", "hint"))
+    assert f"{SUMMARISE_ABOVE} of {SUMMARISE_ABOVE + 1} agents are well" in text
+    assert "77" in text
+    assert text.count("FOLLOW") == 0
+    lines = plain_lines(rows)
+    assert [line.split(" | ")[0] for line in lines] == ["drone 77", "swarm"]
+
+
+def test_plain_lines_are_name_and_line() -> None:
+    (line,) = plain_lines([ill(2)])
+    assert line.startswith("drone 2 | mode HOLD, height 1.23 m, goal error 0.30 m, latency 12.3 ms")
+    assert line.endswith("flags fence hand_stale")
+
+
+@pytest.mark.parametrize(
+    ("modes", "down", "landed"),
+    [
+        ("", True, False),
+        ("GROUND GROUND GROUND", True, False),
+        ("GROUND GROUND GROUND GROUND", True, True),
+        ("GROUND LAND GROUND GROUND", False, False),
+        ("GROUND STOP GROUND GROUND", True, False),
+    ],
+)
+def test_the_monitor_knows_when_everybody_is_down(modes: str, down: bool, landed: bool) -> None:
+    states = [state(drone, Mode(mode)) for drone, mode in enumerate(modes.split(), start=1)]
+    monitor = Swarm().say(*states)
+    assert (monitor.all_down, monitor.all_landed) == (down, landed)
+
+
+@pytest.mark.parametrize(
+    ("wish", "ended"), [(Wish.FLY, False), (Wish.HOLD, False), (Wish.LAND, True), (Wish.STOP, True)]
+)
+def test_the_hand_ends_the_flight_when_everybody_is_down(wish: Wish, ended: bool) -> None:
+    swarm = Swarm()
+    assert swarm.say(hand(wish)).ended_by_hand is ended
+    assert swarm.say(state(1, Mode.LAND)).ended_by_hand is False
+
+
+def test_the_monitor_counts_garbage_and_impostors_and_goes_on() -> None:
+    swarm = Swarm()
+    swarm.bus.publisher(HAND)(b"\xff\x00")
+    swarm.bus.publisher(DRONE_STATE, id=3)(encode(state(2)))
+    swarm.say(state(1))
+    assert swarm.monitor.rejected == {"malformed": 1}
+    assert set(swarm.monitor.stats.latest) == {1}
+
+
+def test_presence_is_followed() -> None:
+    swarm = Swarm()
+    swarm.bus.announce("drone", 1)
+    assert swarm.monitor.present == {"drone/1"}
+    swarm.bus.close()
+    assert swarm.monitor.present == set()
+
+
+def test_the_summary_keeps_the_contract() -> None:
+    swarm = Swarm()
+    monitor = swarm.say(
+        hand(), status(1, seq=0, cpu=5.0), status(1, seq=1, cpu=0.1), status(1, seq=2, cpu=0.3), state(1)
+    )
+    summary = flight_summary(outcome(), monitor)
+    assert json.loads(json.dumps(summary)) == summary
+    assert summary["ok"] is True
+    assert summary["min_distance_m"] == 0.5
+    agent = summary["agents"][0]
+    assert agent["cpu"] == pytest.approx(0.2)  # the first status covers the start-up
+    assert agent["rss_mb"] == 52.0
+    assert agent["latency_ms"]["p50"] == pytest.approx(1.0, rel=0.02)
+    assert set(agent) >= {
+        *("id", "steps", "rate_hz", "on_time", "hand_used"),
+        *("tracking_rms_m", "latency_ms", "cpu", "rss_mb"),
+    }
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"landed": False},
+        {"unexpected_exits": {"drone-1": [-9]}},
+        {"referee": REFEREE | {"collisions": 1.0}},
+        {"referee": REFEREE | {"fence_exits": 2.0}},
+    ],
+)
+def test_what_makes_a_flight_not_ok(changes: dict[str, object]) -> None:
+    assert flight_summary(outcome(**changes), Swarm().monitor)["ok"] is False
+
+
+def test_without_a_simulated_world_the_referees_numbers_are_unknown() -> None:
+    summary = flight_summary(outcome(referee={}), Swarm().monitor)
+    assert summary["ok"] is True
+    assert summary["min_distance_m"] is None
+    assert summary["collisions"] is None
+
+
+def test_the_printed_summary_fits_80_columns_and_survives_missing_numbers() -> None:
+    console = Console(file=io.StringIO(), width=80)
+    print_summary(flight_summary(outcome(referee={}), Swarm().say(hand(), state(1))), console)
+    text = cast(io.StringIO, console.file).getvalue()
+    assert all(len(line) <= 80 for line in text.splitlines())
+    assert "…" not in text
+    assert "collisions" in text
+
+
+def test_an_interrupt_ends_everything_within_its_promise() -> None:
+    assert INTERRUPTED_LANDING_S + GRACE_S[1] < 6.0
+    assert GRACE_S[2] < 1.0
+
+
+def test_a_console_outlives_its_reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Broken(io.StringIO):
+        def write(self, _: str) -> int:
+            raise BrokenPipeError
+
+        def flush(self) -> None:
+            raise BrokenPipeError
+
+    monkeypatch.setattr("sys.stdout", cast(TextIO, Broken()))
+    console = open_console(stderr=False)
+    console.print(str(tmp_path))
+    assert not console.is_terminal
