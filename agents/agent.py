@@ -9,13 +9,14 @@ from agents.control.avoidance import Encounters
 from agents.control.hand import HandInput
 from agents.control.modes import HAND_STALE
 from agents.control.step import REFERENCE_LOST, Inputs, Reference, Settings, State, start, step
-from agents.senses import Sensed, Senses
 from agents.stepping import due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
 from shared.formation import Formation, Vec
 from shared.messages import NO_HAND, DroneState, HandSample, Heard, Vector
+from shared.nodes import neighbours
 from shared.scenario import Scenario
+from shared.senses import Sensed, Senses
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
@@ -36,7 +37,7 @@ class Agent:
     def __init__(
         self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
     ) -> None:
-        self.senses = Senses(formation, drone)
+        self.senses = Senses(neighbours(formation, drone))
         self.steps = 0
         self._drone = drone
         self._epoch = epoch
@@ -121,7 +122,7 @@ class Agent:
             position=position,
             velocity=velocity,
             pose_age=pose_age,
-            hand=None if hand is None or hand.message.position == NO_HAND else _hand_input(hand.message),
+            hand=None if hand is None or hand.message.position == NO_HAND else hand_input(hand.message),
             wish=None if hand is None else hand.message.mode,
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND.key(), hand),
@@ -152,12 +153,14 @@ class Agent:
         return heard
 
 
-def _hand_input(sample: HandSample) -> HandInput:
+def hand_input(sample: HandSample) -> HandInput:
+    """Returns a sample as the control law takes it."""
     return HandInput(
         position=np.array(sample.position),
         velocity=np.array(sample.velocity),
         yaw=sample.yaw,
-        stamp=sample.stamp_ns / NS_PER_S,
+        # Counted from the relay's start: seconds since 1970 would leave a float with a quarter microsecond.
+        stamp=(sample.stamp_ns - sample.epoch) / NS_PER_S,
     )
 
 

@@ -7,7 +7,7 @@ from agents.control.hand import HandSettings
 from agents.control.steering import SteeringSettings
 from agents.control.step import Settings
 from shared.config import vehicle_settings
-from shared.fence import fence_box
+from shared.fence import fence_box, shape_box
 from shared.formation import Formation, Vec
 from shared.scenario import Scenario
 
@@ -73,13 +73,7 @@ def _goal_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
 
 def _mapped_hand_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
     low, high = _goal_box(scenario, formation)
-    shape = np.vstack([formation.rest, np.zeros(3)])
-    if scenario.hand.follow_yaw:
-        reach = np.array([formation.radius, formation.radius, 0.0])
-        lower, upper = -reach, reach
-        lower[2], upper[2] = shape[:, 2].min(), shape[:, 2].max()
-    else:
-        lower, upper = shape.min(axis=0), shape.max(axis=0)
+    lower, upper = shape_box(scenario, formation)
     low, high = low - lower, high - upper
     # A fence too small for the formation leaves one point: its middle.
     middle = (low + high) / 2.0

@@ -26,6 +26,7 @@ CLOSE_TIMEOUT_S = 2.0
 """Closing may hang during a partition; after this long the process ends without it."""
 
 _LEASE_MS = 1000
+_OTHERS = zenoh.Locality.REMOTE
 _log = logging.getLogger("bus")
 _QOS: dict[Delivery, dict[str, Any]] = {
     Delivery.STATE: {
@@ -80,7 +81,7 @@ class ZenohBus:
         def store(sample: zenoh.Sample) -> None:
             inbox.put(str(sample.key_expr), sample.payload.to_bytes())
 
-        self._declared.append(self._session.declare_subscriber(key_expression, store))
+        self._declared.append(self._session.declare_subscriber(key_expression, store, allowed_origin=_OTHERS))
 
     def announce(self, role: str, number: int) -> None:
         """See `Bus.announce`."""

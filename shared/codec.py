@@ -13,13 +13,15 @@ import msgpack
 from cattrs import Converter
 
 from shared.errors import DecodeError
-from shared.messages import SCHEMA_VERSION, Flag, Heard, Message, Mode, Range, Wish
+from shared.messages import SCHEMA_VERSION, Flag, Heard, Message, Mode, Range, UInt64, Wish
 
 MAX_PAYLOAD = 4096
 """Largest payload in bytes that is looked at at all."""
 
 M = TypeVar("M", bound=Message)
 Hook = Callable[[Any, Any], Any]
+
+_KNOWN_FLAGS = sum(Flag)
 
 
 def encode(message: Message) -> bytes:
@@ -101,7 +103,7 @@ def _flags(value: Any, kind: type[enum.IntFlag]) -> enum.IntFlag:
     if bits < 0 or bits > 0xFFFF_FFFF:
         raise DecodeError("out-of-range", f"flags {bits}")
     # A newer publisher may set flags that we do not know: keep those that we do.
-    return kind(bits & sum(kind))
+    return kind(bits & _KNOWN_FLAGS)
 
 
 def _word(value: Any, kind: type[enum.StrEnum]) -> enum.StrEnum:
@@ -117,7 +119,9 @@ def _ranged_hook(annotated: Any) -> Hook:
     low, high = bounds
     scalar = _integer if base is int else _number
 
-    def number(value: Any, _: Any) -> float:
+    def number(value: Any, _: Any) -> Any:
+        if type(value) is base and low <= value <= high:
+            return value  # the common case, and NaN compares false
         checked = scalar(value)
         if not low <= checked <= high:
             raise DecodeError("out-of-range", f"{checked!r} not in [{low}, {high}]")
@@ -142,10 +146,28 @@ def _ranged_hook(annotated: Any) -> Hook:
 def _heard(value: Any, _: Any) -> Heard:
     if type(value) is not list or len(value) != 3:
         raise DecodeError("wrong-type", f"(epoch, seq, arrival) is expected, not {value!r:.40}")
-    for number in value:
-        if not 0 <= _integer(number) < 2**64:
-            raise DecodeError("out-of-range", f"heard {number}")
-    return Heard(*value)
+    epoch, seq, arrival_ns = value
+    return Heard(_unsigned(epoch, int), _unsigned(seq, int), _unsigned(arrival_ns, int))
+
+
+def _sequence_hook(kind: Any) -> Hook:
+    """Makes the hook of a `tuple[element, ...]`; bytes and maps can be iterated too, but are none."""
+    element = get_args(kind)[0]
+
+    def hook(value: Any, _: Any) -> tuple[Any, ...]:
+        if type(value) is not list:
+            raise DecodeError("wrong-type", f"a list is expected, not {value!r:.40}")
+        return tuple(_converter.structure(item, element) for item in value)
+
+    return hook
+
+
+_unsigned = _ranged_hook(UInt64)
+
+
+def _is_sequence(kind: Any) -> bool:
+    origin: Any = get_origin(kind)
+    return origin is tuple
 
 
 def _is_ranged(kind: Any) -> bool:
@@ -159,6 +181,7 @@ def _make_converter() -> Converter:
     converter.register_structure_hook(str, _text)
     converter.register_structure_hook(bytes, _binary)
     converter.register_structure_hook_factory(_is_ranged, _ranged_hook)
+    converter.register_structure_hook_factory(_is_sequence, _sequence_hook)
     converter.register_structure_hook_func(lambda kind: kind is Heard, _heard)
     # By class, because a hook for `str` or `int` would also take their subclasses and leave a bare string.
     converter.register_structure_hook(Flag, _flags)

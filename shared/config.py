@@ -9,7 +9,7 @@ import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, TypeVar, get_args, get_origin
 
 import attrs
 import tomli_w
@@ -19,6 +19,8 @@ from cattrs.gen import make_dict_structure_fn
 
 from shared.errors import ConfigError
 from shared.scenario import Scenario, VehicleSettings
+
+T = TypeVar("T")
 
 SCENARIOS = Path(__file__).resolve().parent.parent / "deploy" / "scenarios"
 
@@ -71,8 +73,22 @@ def structure_scenario(tree: Mapping[str, Any], origin: str) -> Scenario:
     Raises:
         ConfigError: With origin, key and a hint.
     """
+    return structure(tree, Scenario, origin)
+
+
+def structure(tree: Mapping[str, Any], kind: type[T], origin: str) -> T:
+    """Turns a parsed tree into any configuration class, as strictly as a scenario.
+
+    Args:
+        tree: Nested tables as TOML gives them.
+        kind: The class of the outermost table.
+        origin: Where the tree is from, for messages.
+
+    Raises:
+        ConfigError: With origin, key and a hint.
+    """
     try:
-        return _converter.structure(tree, Scenario)
+        return _converter.structure(tree, kind)
     except BaseValidationError as error:
         raise ConfigError(f"{origin}: {_explain(error)}") from error
 
@@ -117,7 +133,7 @@ def _apply_override(tree: dict[str, Any], item: str) -> None:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         value = text
-    *parents, last = key.strip().split(".")
+    *parents, last = (chunk.strip().strip("\"'") for chunk in key.split("."))
     node = tree
     for parent in parents:
         node = node.setdefault(parent, {})

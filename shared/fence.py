@@ -12,16 +12,27 @@ _CEILING = 2.0
 def fence_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
     """Returns the lower and upper corner (3,) of the fence in the world frame, m.
 
-    A corner that the scenario does not give lies `fence.room` around the rest formation at home; the floor is
-    at z = -0.1 (a landed drone is inside).
+    A corner that the scenario does not give lies `fence.room` around the rest formation at home, wherever it
+    may turn to; the floor is at z = -0.1 (a landed drone is inside).
     """
     fence = scenario.fence
     home = np.array([*scenario.hand.home, 0.0])
-    shape = np.vstack([formation.rest, np.zeros(3)]) + home
-    low = shape.min(axis=0) - fence.room
-    high = shape.max(axis=0) + fence.room
+    lower, upper = shape_box(scenario, formation)
+    low, high = home + lower - fence.room, home + upper + fence.room
     low[2], high[2] = -0.1, scenario.limits.takeoff_height + _CEILING
     return (
         np.array(fence.min) if fence.min is not None else low,
         np.array(fence.max) if fence.max is not None else high,
     )
+
+
+def shape_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
+    """Returns lower and upper corner (3,) of the rest formation and its hand, relative to the mapped hand, m.
+
+    Where the formation follows the hand's yaw it is the box of all its headings.
+    """
+    shape = np.vstack([formation.rest, np.zeros(3)])
+    lower, upper = shape.min(axis=0), shape.max(axis=0)
+    if scenario.hand.follow_yaw:
+        lower[:2], upper[:2] = -formation.radius, formation.radius
+    return lower, upper

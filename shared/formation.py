@@ -226,6 +226,9 @@ def _build_links(
     names = scenario.formation.links
     if names is None:
         names = tuple(f"{reference}-{drone.id}" for drone in drones for reference in drone.references)
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"{where}.links: {name!r} appears {names.count(name)} times; a link is unique")
     special = {settings.name: settings for settings in scenario.impedance.links}
     for name in special:
         if name not in names:

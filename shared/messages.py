@@ -14,6 +14,7 @@ SCHEMA_VERSION = 1
 
 MAX_POSITION = 1_000.0
 MAX_VELOCITY = 50.0
+MAX_DRONE_ID = 65_535
 
 
 class Range(NamedTuple):
@@ -30,7 +31,7 @@ Angle = Annotated[float, Range(-1_000.0, 1_000.0)]
 Seconds = Annotated[float, Range(0.0, 1e9)]
 Fraction = Annotated[float, Range(0.0, 1.0)]
 UInt64 = Annotated[int, Range(0, 2**64 - 1)]
-DroneId = Annotated[int, Range(1, 65_535)]
+DroneId = Annotated[int, Range(1, MAX_DRONE_ID)]
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
@@ -213,7 +214,7 @@ class ProcessStatus(Message):
     """
 
     role: str
-    id: Annotated[int, Range(0, 65_535)]
+    id: Annotated[int, Range(0, MAX_DRONE_ID)]
     pid: UInt64
     host: str
     state: str

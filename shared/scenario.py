@@ -3,6 +3,9 @@
 from typing import Any, Literal
 
 from attrs import Attribute, Factory, field, frozen
+from attrs.validators import optional
+
+from shared.messages import MAX_DRONE_ID
 
 Law = Literal["paper", "stable"]
 Shape = Literal["rhombus", "triangle", "line", "vee", "grid", "custom"]
@@ -18,11 +21,21 @@ def _not_negative(_: Any, attribute: "Attribute[Any]", value: float) -> None:
         raise ValueError(f"{attribute.name} must be >= 0, not {value!r}")
 
 
+def _check_box(low: "Triple | Pair", high: "Triple | Pair") -> None:
+    if any(a > b for a, b in zip(low, high, strict=True)):
+        raise ValueError(f"min {low} must not exceed max {high}")
+
+
 def _key_chunk(_: Any, attribute: "Attribute[Any]", value: str) -> None:
     if not value or not all(c.isalnum() or c in "-_" for c in value):
         raise ValueError(
             f"{attribute.name} must be letters, digits, - or _ (it becomes a key prefix), not {value!r}"
         )
+
+
+def _drone_number(_: Any, attribute: "Attribute[Any]", value: int) -> None:
+    if not 0 < value <= MAX_DRONE_ID:
+        raise ValueError(f"{attribute.name} must be 1 to {MAX_DRONE_ID}, not {value!r}")
 
 
 Triple = tuple[float, float, float]
@@ -59,6 +72,9 @@ class Clip:
 
     min: Pair
     max: Pair
+
+    def __attrs_post_init__(self) -> None:
+        _check_box(self.min, self.max)
 
 
 @frozen(kw_only=True)
@@ -130,7 +146,7 @@ class Drone:
         offset: Place relative to the weighted references, formation frame, m.
     """
 
-    id: int = field(validator=_positive)
+    id: int = field(validator=_drone_number)
     references: tuple[str, ...]
     weights: tuple[float, ...] | None = None
     offset: Triple = (0.0, 0.0, 0.0)
@@ -157,7 +173,7 @@ class FormationSettings:
     n: int = field(default=4, validator=_positive)
     spacing: float = field(default=0.5, validator=_positive)
     width: float = field(default=0.5, validator=_positive)
-    columns: int | None = None
+    columns: int | None = field(default=None, validator=optional(_positive))
     drones: tuple[Drone, ...] = ()
     links: tuple[str, ...] | None = None
     height_from: Literal["hand", "references"] = "hand"
@@ -226,7 +242,7 @@ class VehicleSettings:
     uri: str | None = None
     body: Literal["identified", "crazyflie"] | None = None
     link_loss: Literal["crazyflie", "hover"] | None = None
-    tau: float | None = None
+    tau: float | None = field(default=None, validator=optional(_not_negative))
 
 
 @frozen(kw_only=True)
@@ -236,6 +252,12 @@ class Vehicles:
     all: VehicleSettings = VehicleSettings()
     types: dict[str, VehicleSettings] = Factory(dict)
     robots: dict[str, VehicleSettings] = Factory(dict)
+
+    def __attrs_post_init__(self) -> None:
+        for name, settings in (("all", self.all), *self.robots.items()):
+            if settings.type is not None and settings.type not in self.types:
+                known = ", ".join(self.types) or "none"
+                raise ValueError(f"{name}: no type {settings.type!r} in vehicles.types; known: {known}")
 
 
 @frozen(kw_only=True)
@@ -274,6 +296,10 @@ class Fence:
     max: Triple | None = None
     room: float = field(default=3.0, validator=_positive)
     margin: float = field(default=0.15, validator=_not_negative)
+
+    def __attrs_post_init__(self) -> None:
+        if self.min is not None and self.max is not None:
+            _check_box(self.min, self.max)
 
 
 @frozen(kw_only=True)

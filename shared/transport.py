@@ -75,7 +75,7 @@ class Bus(Protocol):
         """Declares a publication, for example `publisher(DRONE_STATE, id=2)`."""
 
     def subscribe(self, key_expression: str, inbox: Inbox) -> None:
-        """Puts every payload whose key matches (`*` is one chunk) into the inbox."""
+        """Puts every payload of others whose key matches (`*` is one chunk) into the inbox."""
 
     def announce(self, role: str, number: int) -> None:
         """Shows this process's presence until `close` (a liveliness token)."""
@@ -84,7 +84,7 @@ class Bus(Protocol):
         """Calls `on_change("role/id", present)` for every process that appears or disappears."""
 
     def close(self) -> None:
-        """Leaves the swarm; returns in bounded time."""
+        """Leaves the swarm; returns in bounded time, may be called twice."""
 
     def __enter__(self) -> Self: ...
 

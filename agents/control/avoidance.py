@@ -1,8 +1,8 @@
 """Avoidance as velocities of the reference point, planar (DESIGN section 4).
 
 Columns: potential field, Eqs. 14-16, `U = xi/2 |p - goal|^2 + sum eta/2 (1/rho - 1/d0)^2` with rho the distance
-to the surface. Every other drone and the hand: the same repulsion, and `escape`, which looks ahead, because a
-body follows its set-point about half a second late.
+to the surface. Every other drone and the hand: the same repulsion. All three: `escape`, which looks ahead,
+because a body follows its set-point about half a second late.
 
 Encounters are flat lists of pairs, so that one agent and a large batch run the same code.
 """
@@ -16,6 +16,8 @@ from shared.scenario import FieldSettings
 
 FLOOR = 0.02
 """Smallest rho that is computed with, m."""
+STANDSTILL = 0.05
+"""Below this closing speed there is no line of approach, m/s."""
 
 
 @frozen(kw_only=True)
@@ -25,16 +27,22 @@ class Bubble:
     Attributes:
         radius: From something that does not come closer, m.
         lead: The bubble grows by this time times the closing speed, s.
+        slip: Share of the escape that leads aside of what comes closer: without it the one who is right in its
+            way is pushed along in front of it, and two that are pushed together cannot get past each other.
         response: Time constant of leaving the bubble, s.
     """
 
     radius: float
-    lead: float = 0.45
+    lead: float
+    slip: float = 0.0
     response: float = 0.10
 
 
-DRONE_BUBBLE = Bubble(radius=0.26)
-HAND_BUBBLE = Bubble(radius=0.38)
+# Radius, lead and slip: the smallest distances over strokes in all directions, free, against a fence and
+# against a wall of columns, decided (tests/unit/test_safety.py).
+DRONE_BUBBLE = Bubble(radius=0.35, lead=0.5, slip=0.2)
+HAND_BUBBLE = Bubble(radius=0.46, lead=0.5, slip=0.7)
+COLUMN_BUBBLE = Bubble(radius=0.22, lead=0.45)
 
 
 @frozen(kw_only=True)
@@ -64,8 +72,11 @@ def repulsion(gaps: Vec, settings: FieldSettings) -> Vec:
     """
     distance = _length(gaps)
     rho = np.maximum(distance - settings.radius, FLOOR)
+    near = rho < settings.d0
+    if not near.any():
+        return np.zeros_like(gaps)
     strength = settings.eta * (1.0 / rho - 1.0 / settings.d0) / (rho * rho)
-    return np.where(rho < settings.d0, strength, 0.0) * _heading(gaps, distance)
+    return np.where(near, strength, 0.0) * _heading(gaps, distance)
 
 
 def column_velocity(
@@ -110,9 +121,27 @@ def escape(wanted: Vec, points: Vec, velocities: Vec, others: Encounters, bubble
     approach = _along(others.velocity, heading)
     closing = np.maximum(approach - _along(velocities[row], heading), 0.0)
     depth = bubble.radius + bubble.lead * closing - distance
+    inside = depth > 0.0
+    if not inside.any():
+        return np.zeros_like(points)
     needed = depth / bubble.response + np.maximum(approach, 0.0)
-    missing = np.where(depth > 0.0, np.maximum(needed - _along(wanted[row], heading), 0.0), 0.0)
-    return _sum_rows(others, missing * heading, len(points))
+    missing = np.where(inside, np.maximum(needed - _along(wanted[row], heading), 0.0), 0.0)
+    direction = heading + _aside(heading, others.velocity - velocities[row], bubble.slip)
+    return _sum_rows(others, missing * direction, len(points))
+
+
+def columns_near(points: Vec, velocities: Vec, columns: Vec, bubble: Bubble) -> Encounters:
+    """Returns the columns whose bubbles can matter to points (n, 2) that move with velocities (n, 2)."""
+    reach = bubble.radius + bubble.lead * _length(velocities)
+    row, column = np.nonzero(_length(points[:, None, :] - columns)[..., 0] < reach)
+    return Encounters(row=row, position=columns[column], velocity=np.zeros((len(row), 2)))
+
+
+def _aside(heading: Vec, closing: Vec, slip: float) -> Vec:
+    """Returns `slip` across the heading, away from the line of approach; to the left if right on it."""
+    across = np.stack([-heading[:, 1], heading[:, 0]], axis=1)
+    side = np.where(_along(closing, across) > 0.0, -slip, slip)
+    return np.where(_along(closing, heading) > STANDSTILL, side, 0.0) * across
 
 
 def _sum_rows(others: Encounters, pushes: Vec, n: int) -> Vec:

@@ -1,11 +1,8 @@
 """Goals from references and link corrections: one matrix row per drone (Eqs. 11-13, DESIGN section 4)."""
 
-import math
-
 import numpy as np
 from attrs import field, frozen
 
-from agents.control.hand import MappedHand
 from agents.control.impedance import LinkState
 from shared.formation import Formation, Link, Vec
 
@@ -56,7 +53,7 @@ def _rows(formation: Formation, rows: list[int], weights: Vec, links: tuple[Link
 
 
 def corrections(rows: Rows, links: LinkState) -> tuple[Vec, Vec]:
-    """Returns the corrections (n, 3), m, and their rates (n, 3), m/s, in the formation's frame.
+    """Returns the corrections (..., n, 3), m, and their rates, m/s, in the formation's frame.
 
     `correction_i = (-|sum dx|, sum dy, sum dz)` over the links into i. Each term is clamped per axis, its
     state is not; a clamped term has no rate.
@@ -64,43 +61,56 @@ def corrections(rows: Rows, links: LinkState) -> tuple[Vec, Vec]:
     term = np.minimum(np.maximum(links.displacement, -rows.limits), rows.limits)
     moving = np.where(term == links.displacement, links.rate, 0.0)
     total, rate = rows.incidence @ term, rows.incidence @ moving
-    rate[:, 0] *= -np.sign(total[:, 0])
-    total[:, 0] = -np.abs(total[:, 0])
+    rate[..., 0] *= -np.sign(total[..., 0])
+    total[..., 0] = -np.abs(total[..., 0])
     return rows.scale * total, rows.scale * rate
 
 
-def goals(rows: Rows, references: Vec, correction: Vec, yaw: float) -> Vec:
-    """Returns the goals (n, 3), world frame, m: `W [p_hand; p_1..p_m] + R(yaw) (offset + correction)`.
+def goals(rows: Rows, references: Vec, correction: Vec, yaw: float | Vec) -> Vec:
+    """Returns the goals (..., n, 3), world frame, m: `W [p_hand; p_1..p_m] + R(yaw) (offset + correction)`.
 
     Args:
         rows: The rows to compute.
-        references: (1 + m, 3) mapped hand and references: actual positions (`paper`) or goals (`stable`).
-        correction: (n, 3) formation frame, m.
+        references: (..., 1 + m, 3) mapped hand and references: actual positions (`paper`) or goals (`stable`).
+        correction: (..., n, 3) formation frame, m.
         yaw: Heading of the formation, rad.
     """
     return rows.weights @ references + rotate(rows.offsets + correction, yaw)
 
 
-def goal_velocities(
-    rows: Rows, reference_velocities: Vec, correction_rate: Vec, shift: Vec, hand: MappedHand
-) -> Vec:
-    """Returns the rates of the goals (n, 3), m/s, from the hand's velocity and the link rates.
+def goal_velocities(rows: Rows, reference_velocities: Vec, place_velocities: Vec) -> Vec:
+    """Returns the rates of the goals (..., n, 3), m/s, from the hand's velocity and the link rates.
 
     Args:
         rows: The rows to compute.
-        reference_velocities: (1 + m, 3) mapped hand velocity and the references' goal velocities.
-        correction_rate: (n, 3) formation frame, m/s.
-        shift: (n, 3) offset plus correction, formation frame, m.
-        hand: Gives yaw and yaw rate.
+        reference_velocities: (..., 1 + m, 3) mapped hand velocity and the references' goal velocities.
+        place_velocities: (..., n, 3) of `place_velocities`.
     """
-    turning = hand.yaw_rate * np.column_stack([-shift[:, 1], shift[:, 0], np.zeros(len(shift))])
-    return rows.weights @ reference_velocities + rotate(correction_rate + turning, hand.yaw)
+    return rows.weights @ reference_velocities + place_velocities
 
 
-def rotate(vectors: Vec, yaw: float) -> Vec:
-    """Turns vectors (..., 3) about z by `yaw`."""
-    if yaw == 0.0:
+def place_velocities(
+    rows: Rows, correction: Vec, correction_rate: Vec, yaw: float | Vec, yaw_rate: float | Vec
+) -> Vec:
+    """Returns how fast `R(yaw) (offset + correction)` changes, (..., n, 3), world frame, m/s.
+
+    Args:
+        rows: The rows to compute.
+        correction: (..., n, 3) formation frame, m.
+        correction_rate: (..., n, 3) formation frame, m/s.
+        yaw: Heading of the formation, rad.
+        yaw_rate: rad/s.
+    """
+    place, velocity = rows.offsets + correction, correction_rate.copy()
+    velocity[..., 0] -= yaw_rate * place[..., 1]
+    velocity[..., 1] += yaw_rate * place[..., 0]
+    return rotate(velocity, yaw)
+
+
+def rotate(vectors: Vec, yaw: float | Vec) -> Vec:
+    """Turns vectors (..., 3) about z by `yaw`, a number or (...) headings."""
+    if isinstance(yaw, float) and yaw == 0.0:
         return vectors
-    c, s = math.cos(yaw), math.sin(yaw)
+    c, s = np.cos(yaw), np.sin(yaw)
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack([c * x - s * y, s * x + c * y, z], axis=-1)

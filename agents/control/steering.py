@@ -11,7 +11,7 @@ import numpy.typing as npt
 from attrs import evolve, field, frozen
 
 from agents.control import avoidance
-from agents.control.avoidance import DRONE_BUBBLE, HAND_BUBBLE, Encounters
+from agents.control.avoidance import COLUMN_BUBBLE, DRONE_BUBBLE, HAND_BUBBLE, Encounters
 from agents.control.projection import project_swept
 from agents.control.trajectory import Trajectory, advance, limit, norm, tracking_velocity
 from shared.formation import Vec
@@ -19,8 +19,10 @@ from shared.scenario import Avoidance, Limits
 
 Mask = npt.NDArray[np.bool_]
 
-ESCAPE_ACCELERATION = 2.0
+ESCAPE_ACCELERATION = 3.0
 """Factor on the acceleration limit while escaping from a hand or a drone that comes closer."""
+ROUNDS = 5
+"""How often the escapes from drones, hand and columns are reconciled."""
 HAND_SPEED_FACTOR = 1.5
 """The speed limit rises to this times the hand's speed."""
 ON_GOAL = 1e-6
@@ -63,14 +65,14 @@ class Surroundings:
         velocity: (n, 3) own bodies, m/s.
         drones: Other drones near each of ours.
         hand: The real hand, once per drone of ours; None before the first sample.
-        hand_speed: m/s.
+        hand_speed: m/s, a number or (n, 1).
     """
 
     position: Vec = field(eq=False)
     velocity: Vec = field(eq=False)
     drones: Encounters
     hand: Encounters | None
-    hand_speed: float
+    hand_speed: float | Vec = field(eq=False)
 
 
 @frozen(kw_only=True)
@@ -118,7 +120,7 @@ def steer(
     pushed = _keep_off(wanted, trajectory, around, settings)
     escaping = norm(pushed) > 0.0
     acceleration = np.where(escaping, ESCAPE_ACCELERATION, 1.0) * limits.acceleration
-    speed = max(limits.speed, HAND_SPEED_FACTOR * around.hand_speed)
+    speed = np.maximum(limits.speed, HAND_SPEED_FACTOR * around.hand_speed)
     moved = advance(trajectory, inside, wanted + pushed, dt, speed, acceleration)
     point = np.minimum(np.maximum(moved.point, settings.low), settings.high)
     avoiding = escaping | column_near
@@ -160,16 +162,27 @@ def _towards(trajectory: Trajectory, goal: Vec, settings: SteeringSettings, dt: 
 
 
 def _keep_off(wanted: Vec, trajectory: Trajectory, around: Surroundings, settings: SteeringSettings) -> Vec:
-    """Returns the velocity (n, 3) to add to stay away from every drone and from the hand."""
+    """Returns the velocity (n, 3) to add to stay away from every drone, from the hand and from the columns.
+
+    Each only adds what the others left missing; further rounds settle between those that disagree. Columns,
+    which never give way, have the last word.
+    """
     point, moving = trajectory.point[:, :2], trajectory.velocity[:, :2]
     body, flying = around.position[:, :2], around.velocity[:, :2]
-    fields = settings.avoidance.separation
-    push = avoidance.separation(point, around.drones, fields)
-    push += avoidance.escape(wanted[:, :2] + push, body, flying, around.drones, DRONE_BUBBLE)
+    keep_off = [(body, flying, around.drones, DRONE_BUBBLE)]
+    push = avoidance.separation(point, around.drones, settings.avoidance.separation)
     if around.hand is not None:
-        push += avoidance.separation(point, around.hand, fields)
-        push += avoidance.escape(wanted[:, :2] + push, point, moving, around.hand, HAND_BUBBLE)
-        push += avoidance.escape(wanted[:, :2] + push, body, flying, around.hand, HAND_BUBBLE)
+        keep_off += [(point, moving, around.hand, HAND_BUBBLE), (body, flying, around.hand, HAND_BUBBLE)]
+        push += avoidance.separation(point, around.hand, settings.avoidance.separation)
+    if len(settings.columns):
+        columns = avoidance.columns_near(body, flying, settings.columns, COLUMN_BUBBLE)
+        keep_off.append((body, flying, columns, COLUMN_BUBBLE))
+    for _ in range(ROUNDS):
+        before = push.copy()
+        for points, velocities, others, bubble in keep_off:
+            push += avoidance.escape(wanted[:, :2] + push, points, velocities, others, bubble)
+        if np.array_equal(push, before):
+            break
     return np.column_stack([push, np.zeros(len(push))])
 
 
@@ -177,9 +190,9 @@ def _on_goal(trajectory: Trajectory) -> Mask:
     return norm(trajectory.point - trajectory.goal) < ON_GOAL
 
 
-def _lead_share(escaping: Mask, hand_speed: float, settings: SteeringSettings) -> Vec:
+def _lead_share(escaping: Mask, hand_speed: float | Vec, settings: SteeringSettings) -> Vec:
     """Returns how much (n, 1) of the lead is used: all under `stable`, what safety needs under `paper`."""
     if settings.always_lead:
         return np.ones(escaping.shape)
     excess = (hand_speed - settings.lead_above) / (0.25 * settings.lead_above)
-    return np.where(escaping, 1.0, min(max(excess, 0.0), 1.0))
+    return np.where(escaping, 1.0, np.minimum(np.maximum(excess, 0.0), 1.0))

@@ -7,7 +7,7 @@ from attrs import field, frozen
 
 from agents.control import modes
 from agents.control.avoidance import Encounters
-from agents.control.goals import Rows, corrections, goal_velocities, goals, rotate
+from agents.control.goals import Rows, corrections, goal_velocities, goals, place_velocities, rotate
 from agents.control.hand import HandInput, HandSettings, MappedHand, freeze, map_hand
 from agents.control.impedance import LinkState, rest_state, step_links, transition_rows
 from agents.control.modes import ModeInputs, ModeState, next_mode
@@ -232,7 +232,8 @@ def _law(inputs: Inputs, hand: MappedHand, links: LinkState, settings: Settings)
     velocities = np.array([hand.velocity, *(r.goal_velocity for r in heard)])
     correction, rate = corrections(rows, links)
     goal = goals(rows, points, correction, hand.yaw)
-    goal_velocity = goal_velocities(rows, velocities, rate, rows.offsets + correction, hand)
+    places = place_velocities(rows, correction, rate, hand.yaw, hand.yaw_rate)
+    goal_velocity = goal_velocities(rows, velocities, places)
     return goal[0], goal_velocity[0]
 
 

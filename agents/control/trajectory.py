@@ -55,7 +55,7 @@ def tracking_velocity(trajectory: Trajectory, goal: Vec, dt: float, acceleration
 
 
 def advance(
-    trajectory: Trajectory, goal: Vec, wanted: Vec, dt: float, speed: float, acceleration: float | Vec
+    trajectory: Trajectory, goal: Vec, wanted: Vec, dt: float, speed: float | Vec, acceleration: float | Vec
 ) -> Trajectory:
     """Moves the reference with the wanted velocity as far as the limits allow.
 

@@ -2,20 +2,18 @@
 
 import argparse
 import importlib
-import sys
 from collections.abc import Sequence
 from typing import Protocol, cast
 
-from shared.errors import ConfigError, SwarmTouchError
+from shared.errors import SwarmTouchError
+from shared.process import explain
 
 COMMANDS = {
     "up": "fly a scenario with real processes on this machine",
+    "sim": "fly a scenario on a virtual clock in one process",
     "scenarios": "list the scenarios that ship",
 }
 """Command -> one line; the module has the command's name."""
-
-EXIT_FAILED = 1
-EXIT_REFUSED = 2
 
 
 class Command(Protocol):
@@ -43,12 +41,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     try:
         return _load(arguments.command).run(arguments)
-    except ConfigError as error:
-        print(f"swarmtouch: {error}", file=sys.stderr)
-        return EXIT_REFUSED
     except SwarmTouchError as error:
-        print(f"swarmtouch: {error}", file=sys.stderr)
-        return EXIT_FAILED
+        return explain("swarmtouch", error)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -15,14 +15,12 @@ from pathlib import Path
 from attrs import define, field
 
 from deploy.launcher.process_table import ProcessRow
-from shared.process import LAUNCHER_PID
+from shared.process import EXIT_REFUSED, LAUNCHER_PID
 
 FIRST_BACKOFF_S = 0.25
 LONGEST_BACKOFF_S = 4.0
 STEADY_S = 10.0
 """A process that has run for so long is restarted without delay growth."""
-EXIT_REFUSED = 2
-"""Exit code of a process that refuses its configuration: starting it again would not help."""
 
 
 @define

@@ -36,22 +36,29 @@ FIXED_DELAY_MS = 107
 class Flight(NamedTuple):
     hand_ns: Ints
     """(f,) stamps of the hand frames."""
+    wanted: Vec
+    """(f, 3, 2) what the law says for each hand frame, before avoidance, m."""
     predicted: Vec
-    """(f, 3, 2) what the law says for each hand frame, m."""
+    """(f, 3, 2) the same after avoidance, m."""
     tick_ns: Ints
     """(n,) stamps of drone 1's set-points."""
     recorded: Vec
     """(n, 3, 2) set-points of the three drones, m."""
 
 
-def predict(folder: Path, meta: Meta) -> tuple[Ints, Vec]:
-    """Runs the product's law over every hand frame."""
-    scenario = Scenario(
+def flown_scenario(meta: Meta) -> Scenario:
+    """The law that flew, as a scenario."""
+    return Scenario(
         hand=Hand(mapping="relative", gain=meta.gain, offset=(*meta.offset, 0.0), follow_yaw=False),
         formation=FormationSettings(
             shape="triangle", n=3, spacing=meta.side * meta.height_factor, width=meta.side, links=()
         ),
     )
+
+
+def predict(folder: Path, meta: Meta) -> tuple[Ints, Vec, Vec]:
+    """Runs the product's law over every hand frame: stamps, set-points before and after avoidance."""
+    scenario = flown_scenario(meta)
     formation = build_formation(scenario)
     settings = HandSettings(
         hand=scenario.hand,
@@ -68,16 +75,16 @@ def predict(folder: Path, meta: Meta) -> tuple[Ints, Vec]:
 
     columns = np.array([(o.x, o.y) for o in read_obstacles(folder)])
     before = np.array([wanted(position) for position in hand.position])
-    return hand.t_ns, project_exact(before, columns, meta.obstacle_radius)
+    return hand.t_ns, before, project_exact(before, columns, meta.obstacle_radius)
 
 
 def load(folder: Path) -> Flight:
-    hand_ns, predicted = predict(folder, read_meta(folder))
+    hand_ns, wanted, predicted = predict(folder, read_meta(folder))
     drones = [read_setpoints(folder / f"cf{i}_sp.csv.gz") for i in (1, 2, 3)]
     # Where rows are missing they are the first ones: the last rows belong together.
     count = min(len(drone.t_ns) for drone in drones)
     recorded = np.stack([drone.position[-count:, :2] for drone in drones], axis=1)
-    return Flight(hand_ns, predicted, drones[0].t_ns[-count:], recorded)
+    return Flight(hand_ns, wanted, predicted, drones[0].t_ns[-count:], recorded)
 
 
 def match_frames(flight: Flight) -> tuple[Ints, Ints]:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from attrs import evolve, field, frozen
 
 from agents.vehicles.bodies.advance import BODIES, advance
+from agents.vehicles.bodies.pid import hovering
 from agents.vehicles.bodies.state import AIRBORNE_HEIGHT, BodyState, Commands, Mask, Vec, at_rest
 
 Rows = npt.NDArray[np.intp]
@@ -61,6 +62,12 @@ def park_fleet(bodies: Mapping[int, str], positions: Vec) -> Fleet:
         if (rows := np.flatnonzero(kinds == body)).size
     )
     return Fleet(tuple(bodies), parked.position, parked.velocity, groups)
+
+
+def hover_fleet(fleet: Fleet) -> Fleet:
+    """Returns the same fleet in a steady hover where it is."""
+    groups = tuple(evolve(group, state=hovering(fleet.position[group.rows])) for group in fleet.groups)
+    return evolve(fleet, groups=groups)
 
 
 def hold(fleet: Fleet, drones: AbstractSet[int]) -> Fleet:

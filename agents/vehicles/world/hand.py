@@ -6,10 +6,7 @@ import numpy as np
 
 from agents.vehicles.bodies.state import Vec
 from shared.clock import Clock
-from shared.codec import decode
-from shared.errors import DecodeError
-from shared.messages import HandSample
-from shared.topics import HAND
+from shared.senses import Senses
 from shared.transport import Bus, Inbox
 
 
@@ -19,22 +16,21 @@ class HandWatch:
     Args:
         bus: Where `human/hand` is published.
         clock: Stamps arrivals.
-
-    Attributes:
-        rejected: Refused payloads by reason.
     """
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self._inbox = Inbox(clock)
-        self._position: Vec | None = None
-        self.rejected: Counter[str] = Counter()
-        bus.subscribe(HAND.key(), self._inbox)
+        self._senses = Senses(ids=())
+        for key in self._senses.keys:
+            bus.subscribe(key, self._inbox)
+
+    @property
+    def rejected(self) -> Counter[str]:
+        """Refused payloads by reason."""
+        return self._senses.rejected
 
     def position(self) -> Vec | None:
         """Returns the newest position (3,) in the world frame, m; None before the first."""
-        for arrival in self._inbox.take().get(HAND.key(), ()):
-            try:
-                self._position = np.array(decode(arrival.payload, HandSample).position)
-            except DecodeError as error:
-                self.rejected[error.reason] += 1
-        return self._position
+        self._senses.take(self._inbox.take())
+        hand = self._senses.hand
+        return None if hand is None else np.array(hand.message.position)

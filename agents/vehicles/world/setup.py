@@ -51,12 +51,17 @@ def plan_world(scenario: Scenario) -> Setup:
         fleet=fleet,
         hovers=np.array([s.link_loss == "hover" for s in simulated.values()], dtype=bool),
         address=_address({drone: str(s.uri) for drone, s in simulated.items()}),
-        rules=Rules(
-            ids=fleet.ids,
-            columns=np.array([(o.x, o.y) for o in scenario.obstacles], dtype=np.float64).reshape(-1, 2),
-            column_radius=scenario.avoidance.columns.radius,
-            fence=fence_box(scenario, formation),
-        ),
+        rules=referee_rules(scenario, formation, fleet.ids),
+    )
+
+
+def referee_rules(scenario: Scenario, formation: Formation, ids: tuple[int, ...]) -> Rules:
+    """Returns what the referee counts for some drones of a scenario."""
+    return Rules(
+        ids=ids,
+        columns=np.array([(o.x, o.y) for o in scenario.obstacles], dtype=np.float64).reshape(-1, 2),
+        column_radius=scenario.avoidance.columns.radius,
+        fence=fence_box(scenario, formation),
     )
 
 

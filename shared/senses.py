@@ -1,8 +1,8 @@
-"""What a drone has heard: the newest valid sample per topic, and what was rejected, by reason."""
+"""What a process has heard: the newest valid sample per topic, and what was rejected, by reason."""
 
 import logging
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Generic, TypeVar
 
 from attrs import frozen
@@ -10,9 +10,7 @@ from attrs import frozen
 from shared.clock import NS_PER_S
 from shared.codec import decode
 from shared.errors import DecodeError
-from shared.formation import Formation
 from shared.messages import DroneState, HandSample, Heard, Message
-from shared.nodes import neighbours
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
@@ -40,11 +38,10 @@ class Sensed(Generic[M]):
 
 
 class Senses:
-    """Newest valid hand sample and drone states of one agent.
+    """Newest valid hand sample and drone states of one listener.
 
     Args:
-        formation: Whom there is to hear.
-        drone: Own number.
+        ids: Numbers of the drones to listen to.
 
     Attributes:
         hand: Newest hand sample, None before the first.
@@ -52,11 +49,11 @@ class Senses:
         rejected: Dropped samples by reason.
     """
 
-    def __init__(self, formation: Formation, drone: int) -> None:
+    def __init__(self, ids: Iterable[int]) -> None:
         self.hand: Sensed[HandSample] | None = None
         self.drones: dict[int, Sensed[DroneState]] = {}
         self.rejected: Counter[str] = Counter()
-        self._ids = {DRONE_STATE.key(id=other): other for other in neighbours(formation, drone)}
+        self._ids = {DRONE_STATE.key(id=drone): drone for drone in ids}
         self._logged_ns = 0
 
     @property

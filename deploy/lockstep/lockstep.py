@@ -1,0 +1,140 @@
+"""The lockstep simulator: real agents that exchange encoded bytes, on a virtual clock.
+
+In a tick the hand's sample reaches everybody, then the agents step level by level on their bodies' poses, each
+published state reaches its listeners at once, and at the end the bodies move on (DESIGN section 4). The same
+inputs give the same bytes.
+"""
+
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+
+import numpy as np
+
+from agents.agent import Agent
+from agents.settings import agent_settings, hand_settings
+from agents.vehicles.base import Pose
+from agents.vehicles.bodies.fleet import Fleet, advance_fleet
+from agents.vehicles.bodies.state import Command, Commands
+from deploy.lockstep.hand_track import track_hand
+from deploy.lockstep.record import Moment, Record, make_record
+from deploy.lockstep.start import rest_places, start_fleet
+from deploy.lockstep.ticks import tick_length, tick_ns
+from shared.codec import encode
+from shared.formation import Formation, Vec
+from shared.messages import DroneState, HandSample, Mode
+from shared.scenario import Scenario
+from shared.topics import DRONE_STATE, HAND
+from shared.transport import Arrival
+
+_COMMANDS = {Mode.STOP: Command.CUT, Mode.GROUND: Command.IDLE}
+
+
+class Lockstep:
+    """Agents and bodies of one swarm, driven tick by tick.
+
+    Args:
+        scenario: The scenario.
+        formation: Its formation.
+        fleet: Bodies, one per drone in the formation's order.
+
+    Attributes:
+        fleet: The bodies now.
+        tick: Number of the next tick.
+        payloads: What was published in the last tick, by key: the hand's sample and every drone's state.
+    """
+
+    def __init__(self, scenario: Scenario, formation: Formation, fleet: Fleet) -> None:
+        self.fleet = fleet
+        self.tick = 0
+        self.payloads: dict[str, bytes] = {}
+        self._rate = scenario.rates.control_hz
+        self._order = [row for level in formation.levels for row in level]
+        self._agents = [
+            Agent(scenario, formation, drone, agent_settings(scenario, formation, drone), epoch=0)
+            for drone in formation.ids
+        ]
+        self._keys = [DRONE_STATE.key(id=drone) for drone in formation.ids]
+        self._listeners = {
+            key: [agent for agent in self._agents if key in agent.senses.keys]
+            for key in (HAND.key(), *self._keys)
+        }
+
+    def advance(self, sample: HandSample) -> list[DroneState]:
+        """Makes one tick.
+
+        Args:
+            sample: What the relay sends in this tick.
+
+        Returns:
+            What each drone published, in the formation's order.
+        """
+        now = tick_ns(self.tick, self._rate)
+        self._publish(HAND.key(), encode(sample), now)
+        states: dict[int, DroneState] = {}
+        for row in self._order:
+            states[row] = self._agents[row].step(now, self._pose(row), 0.0)
+            self._publish(self._keys[row], encode(states[row]), now)
+        ordered = [states[row] for row in range(len(states))]
+        kind = np.array([_COMMANDS.get(state.mode, Command.FLY) for state in ordered], dtype=np.int8)
+        commands = Commands(kind, np.array([state.setpoint for state in ordered]))
+        self.fleet = advance_fleet(self.fleet, commands, tick_length(self.tick, self._rate))
+        self.tick += 1
+        return ordered
+
+    def _publish(self, key: str, payload: bytes, now_ns: int) -> None:
+        self.payloads[key] = payload
+        for agent in self._listeners[key]:
+            agent.receive({key: [Arrival(payload, now_ns)]})
+
+    def _pose(self, row: int) -> Pose:
+        x, y, z = self.fleet.position[row].tolist()
+        vx, vy, vz = self.fleet.velocity[row].tolist()
+        return Pose(
+            position=(x, y, z),
+            velocity=(vx, vy, vz),
+            yaw=0.0,
+            battery=1.0,
+            airborne=bool(self.fleet.airborne[row]),
+            seq=self.tick,
+        )
+
+
+def fly_lockstep(
+    scenario: Scenario,
+    formation: Formation,
+    samples: Sequence[HandSample],
+    *,
+    airborne: bool = True,
+    held: AbstractSet[int] = frozenset(),
+    places: Vec | None = None,
+) -> Record:
+    """Flies a whole hand.
+
+    Args:
+        scenario: The scenario.
+        formation: Its formation.
+        samples: One per tick, at least one.
+        airborne: Start hovering in the rest formation; else on the ground below it.
+        held: Drones that a hand holds in place.
+        places: (N, 3) where to start instead, m.
+
+    Returns:
+        The run.
+    """
+    hand = track_hand(samples, hand_settings(scenario, formation))
+    rows = {1 + formation.row(drone) for drone in held}
+    start = rest_places(formation, hand) if places is None else places
+    swarm = Lockstep(scenario, formation, start_fleet(scenario, formation, start, airborne=airborne, held=rows))
+    moments = [_moment(formation, swarm.advance(sample)) for sample in samples]
+    return make_record(formation, hand, moments)
+
+
+def _moment(formation: Formation, states: list[DroneState]) -> Moment:
+    return Moment(
+        position=np.array([state.position for state in states]),
+        goal=np.array([state.goal for state in states]),
+        setpoint=np.array([state.setpoint for state in states]),
+        displacement=np.array(
+            [states[link.target].displacements[link.name] for link in formation.links]
+        ).reshape(-1, 3),
+    )

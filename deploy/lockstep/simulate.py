@@ -1,0 +1,86 @@
+"""From what the user asked for to a simulated run and its summary."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+from attrs import frozen
+
+from agents.vehicles.world.setup import referee_rules
+from deploy.launcher.process_table import hint_overrides
+from deploy.lockstep.batched import fly_batched
+from deploy.lockstep.hand_track import relayed
+from deploy.lockstep.lockstep import fly_lockstep
+from deploy.lockstep.picture import draw
+from deploy.lockstep.record import Record, judge, tracking_rms, write_csv
+from human_relay.sources import source_hints
+from shared.config import load_scenario
+from shared.formation import build_formation
+from shared.scenario import Scenario
+
+CENTRAL = "central"
+"""One computer for all drones, instead of one agent per drone."""
+
+
+@frozen(kw_only=True)
+class Options:
+    """What the user asks for.
+
+    Attributes:
+        scenario: Name or file.
+        hand: URI of the hand source.
+        seconds: Longest flight, s.
+        law: `paper`, `stable`, `central` or None for the scenario's own.
+        overrides: `key=value` items for the scenario.
+        csv: Where to write the ticks.
+        plot: Where to draw the top view.
+    """
+
+    scenario: str
+    hand: str
+    seconds: float
+    law: str | None
+    overrides: tuple[str, ...]
+    csv: Path | None
+    plot: Path | None
+
+
+def simulate(options: Options) -> dict[str, Any]:
+    """Simulates one flight from a hover in the rest formation.
+
+    Returns:
+        The summary: drones, seconds, realtime_factor, the referee's distances and counts, tracking_rms_m.
+
+    Raises:
+        ConfigError: The scenario or the hand is refused, or a plot cannot be made.
+    """
+    law = [f"swarm.law={options.law}"] if options.law not in (None, CENTRAL) else []
+    hints = hint_overrides(source_hints(options.hand))
+    scenario = load_scenario(options.scenario, (*hints, *law, *options.overrides))
+    formation = build_formation(scenario, options.scenario)
+    samples = relayed(options.hand, options.seconds, scenario.rates.control_hz)
+    started = time.perf_counter()
+    fly = fly_batched if options.law == CENTRAL else fly_lockstep
+    record = fly(scenario, formation, samples)
+    took_s = time.perf_counter() - started
+    if options.csv:
+        write_csv(record, options.csv)
+    if options.plot:
+        draw(record, scenario, options.plot)
+    return _summary(record, scenario, took_s)
+
+
+def _summary(record: Record, scenario: Scenario, took_s: float) -> dict[str, Any]:
+    ids = record.formation.ids
+    verdict = judge(record, referee_rules(scenario, record.formation, ids))
+    seconds = len(record.hand.t) / scenario.rates.control_hz
+    return {
+        "drones": len(ids),
+        "seconds": seconds,
+        "realtime_factor": seconds / took_s,
+        "min_distance_m": verdict.get("min_distance_m"),
+        "min_hand_distance_m": verdict.get("min_hand_distance_m"),
+        "collisions": verdict["collisions"],
+        "fence_exits": verdict["fence_exits"],
+        "tracking_rms_m": float(tracking_rms(record).mean()),
+    }

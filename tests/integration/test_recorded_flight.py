@@ -1,0 +1,37 @@
+"""A recorded human hand through the recorded columns, with real processes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.replay.flights import require_flight
+
+
+@pytest.mark.timeout(120)
+def test_the_maze_is_flown_by_the_recorded_hand(tmp_path: Path) -> None:
+    hand = f"recording:{require_flight('S2_visual_1')}"
+    command = [
+        sys.executable,
+        "-m",
+        "deploy.cli",
+        "up",
+        "maze",
+        "--hand",
+        hand,
+        "--runs",
+        str(tmp_path),
+        "--json",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout.splitlines()[-1])
+    assert summary["ok"] is True
+    assert (summary["collisions"], summary["fence_exits"], summary["restarts"]) == (0, 0, 0)
+    assert [agent["id"] for agent in summary["agents"]] == [1, 2, 3]
+    for agent in summary["agents"]:
+        assert agent["hand_used"] >= 0.995, agent
+        assert agent["steps"] > 1_000
+    assert "Traceback" not in "".join(path.read_text() for path in tmp_path.glob("*/logs/*.log"))

@@ -1,0 +1,88 @@
+"""Many runs side by side in the batched simulator, watched independently of it."""
+
+from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from agents.settings import hand_settings
+from deploy.lockstep.batched import Batch, hands_at
+from deploy.lockstep.hand_track import track_hand
+from deploy.lockstep.record import Record
+from deploy.lockstep.start import rest_places
+from shared.fence import fence_box
+from shared.formation import build_formation
+from shared.messages import HandSample
+from shared.scenario import Scenario
+
+Vec = npt.NDArray[np.float64]
+
+
+class Tick(NamedTuple):
+    """One tick of B runs: hand and mapped hand (B, 1, 3), bodies and goals (B, N, 3), m."""
+
+    hand: Vec
+    mapped: Vec
+    position: Vec
+    goal: Vec
+
+
+class Distances(NamedTuple):
+    """Smallest distances of each of B runs, 3-D, m, and how far a body was out of the fence at most, m."""
+
+    drones: Vec
+    hand: Vec
+    outside: Vec
+
+
+def fly_all(
+    scenario: Scenario,
+    hands: Sequence[Sequence[HandSample]],
+    held: AbstractSet[tuple[int, int]] = frozenset(),
+) -> Iterator[Tick]:
+    """Flies all hands at once, each from the rest formation; a shorter hand stays at its end."""
+    formation = build_formation(scenario)
+    settings = hand_settings(scenario, formation)
+    tracks = [track_hand(samples, settings) for samples in hands]
+    batch = Batch(scenario, formation, np.array([rest_places(formation, track) for track in tracks]), held)
+    for tick in range(max(len(samples) for samples in hands)):
+        now = hands_at(tracks, tick)
+        moment = batch.advance(now)
+        yield Tick(now.position, now.point, moment.position, moment.goal)
+
+
+def distances(scenario: Scenario, ticks: Iterator[Tick]) -> Distances:
+    """Watches runs to their end."""
+    low, high = fence_box(scenario, build_formation(scenario))
+    worst: Distances | None = None
+    for tick in ticks:
+        now = _distances_now(tick, low, high)
+        worst = (
+            now
+            if worst is None
+            else Distances(
+                np.minimum(worst.drones, now.drones),
+                np.minimum(worst.hand, now.hand),
+                np.maximum(worst.outside, now.outside),
+            )
+        )
+    assert worst is not None
+    return worst
+
+
+def record_distances(scenario: Scenario, record: Record) -> Distances:
+    """The same for a record of one run."""
+    hand, mapped = record.hand.position[:, None, None], record.hand.point[:, None, None]
+    rows = zip(hand, mapped, record.position[:, None], record.goal[:, None], strict=True)
+    return distances(scenario, (Tick(*row) for row in rows))
+
+
+def _distances_now(tick: Tick, low: Vec, high: Vec) -> Distances:
+    position = tick.position
+    drones = position.shape[1]
+    gaps = np.linalg.norm(position[:, :, None] - position[:, None], axis=3)
+    gaps[:, np.arange(drones), np.arange(drones)] = np.inf
+    outside = np.maximum(low - position, position - high).max(axis=(1, 2))
+    return Distances(gaps.min(axis=(1, 2)), np.linalg.norm(position - tick.hand, axis=2).min(axis=1), outside)

@@ -1,0 +1,136 @@
+"""The house: our packages are ours, pure cores are pure, and a flying process stays light."""
+
+import ast
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("agents", "human_relay", "glove_bridge", "observer", "shared", "deploy")
+
+PURE = [
+    *sorted((ROOT / "agents/control").glob("*.py")),
+    *sorted((ROOT / "agents/vehicles/bodies").glob("*.py")),
+    *(ROOT / f"agents/{name}.py" for name in ("agent", "settings", "stepping")),
+    ROOT / "agents/vehicles/world/referee.py",
+    *(ROOT / f"human_relay/{name}.py" for name in ("velocity", "relay")),
+    *(ROOT / f"observer/{name}.py" for name in ("flight_stats", "agent_log", "hand_log", "histogram")),
+    *(
+        ROOT / f"shared/{name}.py"
+        for name in (
+            "codec",
+            "fence",
+            "formation",
+            "geometry",
+            "messages",
+            "nodes",
+            "scenario",
+            "shapes",
+            "topics",
+        )
+    ),
+]
+IMPURE = {
+    *("asyncio", "logging", "multiprocessing", "os", "random", "select", "signal", "socket", "subprocess"),
+    *("threading", "time", "datetime", "serial", "zenoh", "shared.bus", "shared.process", "shared.clock"),
+}
+HARMLESS = {"shared.clock.NS_PER_S"}
+
+
+def imports(path: Path) -> set[str]:
+    """Every name that a file imports, `module` or `module.name`, wherever in the file."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def is_below(name: str, package: str) -> bool:
+    return name == package or name.startswith(f"{package}.")
+
+
+def sources() -> list[Path]:
+    return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_a_package_is_ours(name: str) -> None:
+    """PyPI's openai-agents installs a package `agents`, too."""
+    package = importlib.import_module(name)
+    assert package.__file__ == str(ROOT / name / "__init__.py")
+
+
+@pytest.mark.parametrize("path", PURE, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_pure_core_imports_nothing_impure(path: Path) -> None:
+    used = imports(path) - HARMLESS
+    assert {name for name in used if any(is_below(name, module) for module in IMPURE)} == set()
+
+
+@pytest.mark.parametrize("path", PURE, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_pure_core_opens_nothing(path: Path) -> None:
+    calls = [
+        node.func.id
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    ]
+    assert not {"open", "print", "input"} & set(calls)
+
+
+def test_only_the_bus_knows_zenoh() -> None:
+    users = {
+        str(path.relative_to(ROOT)) for path in sources() if any(is_below(n, "zenoh") for n in imports(path))
+    }
+    assert users == {"shared/bus.py"}
+
+
+@pytest.mark.parametrize("name", ["agents", "human_relay", "glove_bridge", "observer"])
+def test_a_process_package_knows_only_itself_and_the_vocabulary(name: str) -> None:
+    strangers = set(PACKAGES) - {name, "shared"}
+    for path in (ROOT / name).rglob("*.py"):
+        assert {n for n in imports(path) if n.partition(".")[0] in strangers} == set(), path
+
+
+def loaded_by(module: str) -> set[str]:
+    """Top-level modules in a fresh process that has imported one module."""
+    code = f"import sys, {module}; print(*{{name.partition('.')[0] for name in sys.modules}})"
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
+    )
+    return set(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    "module", ["agents.__main__", "human_relay.__main__", "agents.vehicles.world.__main__"]
+)
+def test_a_flying_process_loads_nothing_heavy(module: str) -> None:
+    loaded = loaded_by(module)
+    heavy = {"rich", "rosbags", "matplotlib", "scipy", "cryptography", "mcap", "websockets", "http", "asyncio"}
+    assert loaded & heavy == set()
+    assert {"zenoh", "numpy"} <= loaded
+
+
+def test_the_control_law_loads_without_bus_or_threads_of_ours() -> None:
+    assert loaded_by("agents.agent") & {"zenoh", "serial", "rich", "asyncio"} == set()
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in sources() if p.name == "__main__.py"], ids=lambda p: str(p.relative_to(ROOT))
+)
+def test_a_main_module_is_short(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 70
+
+
+def test_every_module_says_what_it_is() -> None:
+    silent = [
+        p
+        for p in sources()
+        if p.read_text(encoding="utf-8") and not ast.get_docstring(ast.parse(p.read_text()))
+    ]
+    assert silent == []
