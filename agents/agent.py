@@ -21,6 +21,7 @@ from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
 NEVER = float("inf")
+HAND_KEY = HAND.key()
 
 
 class Agent:
@@ -41,7 +42,7 @@ class Agent:
         self.steps = 0
         self._drone = drone
         self._epoch = epoch
-        self._references = formation.references(drone)
+        self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
         self._settings = settings
         self._rule = step_rule(scenario.rates)
         self._nominal_dt = 1.0 / scenario.rates.control_hz
@@ -104,12 +105,12 @@ class Agent:
         """Says whether the hand and every reference that is alive are newer than at the last step."""
         hand = self.senses.hand
         fresh = [
-            self._is_fresh(DRONE_STATE.key(id=other), sensed)
-            for other in self._references
+            self._is_fresh(key, sensed)
+            for other, key in self._references.items()
             if (sensed := self.senses.drones.get(other)) and sensed.age(now_ns) <= REFERENCE_LOST
         ]
         if hand is not None and hand.age(now_ns) <= HAND_STALE:
-            fresh.append(self._is_fresh(HAND.key(), hand))
+            fresh.append(self._is_fresh(HAND_KEY, hand))
         return bool(fresh) and all(fresh)
 
     def _is_fresh(self, key: str, sensed: Sensed[HandSample] | Sensed[DroneState]) -> bool:
@@ -125,12 +126,12 @@ class Agent:
             hand=None if hand is None or hand.message.position == NO_HAND else hand_input(hand.message),
             wish=None if hand is None else hand.message.mode,
             hand_age=NEVER if hand is None else hand.age(now_ns),
-            hand_fresh=hand is not None and self._is_fresh(HAND.key(), hand),
-            references=tuple(self._reference(other, now_ns) for other in self._references),
+            hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
+            references=tuple(self._reference(other, key, now_ns) for other, key in self._references.items()),
             drones=_encounters([sensed.message for sensed in self.senses.drones.values()]),
         )
 
-    def _reference(self, other: int, now_ns: int) -> Reference | None:
+    def _reference(self, other: int, key: str, now_ns: int) -> Reference | None:
         sensed = self.senses.drones.get(other)
         if sensed is None:
             return None
@@ -141,15 +142,15 @@ class Agent:
             goal_velocity=np.array(state.goal_velocity),
             mode=state.mode,
             age=sensed.age(now_ns),
-            fresh=self._is_fresh(DRONE_STATE.key(id=other), sensed),
+            fresh=self._is_fresh(key, sensed),
         )
 
     def _heard(self) -> dict[str, Heard]:
         """Returns what this step used: the hand and the references."""
-        heard = {} if self.senses.hand is None else {HAND.key(): self.senses.hand.heard}
-        for other in self._references:
+        heard = {} if self.senses.hand is None else {HAND_KEY: self.senses.hand.heard}
+        for other, key in self._references.items():
             if other in self.senses.drones:
-                heard[DRONE_STATE.key(id=other)] = self.senses.drones[other].heard
+                heard[key] = self.senses.drones[other].heard
         return heard
 
 

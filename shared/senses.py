@@ -16,6 +16,7 @@ from shared.transport import Arrival
 
 M = TypeVar("M", bound=Message)
 
+_HAND_KEY = HAND.key()
 _LOG_PERIOD_NS = 5 * NS_PER_S
 _log = logging.getLogger("senses")
 
@@ -59,7 +60,7 @@ class Senses:
     @property
     def keys(self) -> list[str]:
         """Returns the keys to subscribe to."""
-        return [HAND.key(), *self._ids]
+        return [_HAND_KEY, *self._ids]
 
     def take(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Decodes what has arrived; nothing that anyone sends raises."""
@@ -71,7 +72,7 @@ class Senses:
                     self._reject(key, error, arrival_ns)
 
     def _take_one(self, key: str, payload: bytes, arrival_ns: int) -> None:
-        if key == HAND.key():
+        if key == _HAND_KEY:
             sample = decode(payload, HandSample)
             _check_newer(sample, self.hand, arrival_ns, HAND.stale_s)
             self.hand = Sensed(sample, arrival_ns)

@@ -60,6 +60,31 @@ class Encounters:
     velocity: Vec = field(eq=False)
 
 
+@frozen(kw_only=True)
+class Threats:
+    """Encounters that demand an escape.
+
+    Attributes:
+        row: (k,) which of our points.
+        heading: (k, 2) away from the other.
+        needed: (k, 1) speed along the heading that is fast enough, m/s.
+        direction: (k, 2) where to escape to: along the heading and, by `slip`, aside.
+    """
+
+    row: npt.NDArray[np.intp] = field(eq=False)
+    heading: Vec = field(eq=False)
+    needed: Vec = field(eq=False)
+    direction: Vec = field(eq=False)
+
+
+NOBODY = Threats(
+    row=np.empty(0, dtype=np.intp),
+    heading=np.empty((0, 2)),
+    needed=np.empty((0, 1)),
+    direction=np.empty((0, 2)),
+)
+
+
 def repulsion(gaps: Vec, settings: FieldSettings) -> Vec:
     """Returns the repulsive velocity `eta (1/rho - 1/d0) / rho^2` away from each obstacle, Eq. 16.
 
@@ -98,36 +123,42 @@ def column_velocity(
 
 def separation(points: Vec, others: Encounters, settings: FieldSettings) -> Vec:
     """Returns the summed repulsion (n, 2) of the encounters, m/s."""
-    return _sum_rows(others, repulsion(points[others.row] - others.position, settings), len(points))
+    return _sum_rows(others.row, repulsion(points[others.row] - others.position, settings), len(points))
 
 
-def escape(wanted: Vec, points: Vec, velocities: Vec, others: Encounters, bubble: Bubble) -> Vec:
-    """Returns the velocity (n, 2) to add so that no encounter's bubble is entered, or it is left quickly.
+def threats(points: Vec, velocities: Vec, others: Encounters, bubble: Bubble) -> Threats:
+    """Returns the encounters whose bubble a point is in; mostly there are none.
 
-    In a bubble the point must move away at `depth / response` plus the other's own speed towards it; whatever
-    of that is missing from `wanted` is added.
+    In a bubble the point must move away at `depth / response` plus the other's own speed towards it.
 
     Args:
-        wanted: (n, 2) velocity so far, m/s.
         points: (n, 2) m.
         velocities: (n, 2) m/s.
         others: What to keep away from.
         bubble: How far.
     """
-    row = others.row
-    gaps = points[row] - others.position
+    gaps = points[others.row] - others.position
     distance = _length(gaps)
     heading = _heading(gaps, distance)
-    approach = _along(others.velocity, heading)
-    closing = np.maximum(approach - _along(velocities[row], heading), 0.0)
-    depth = bubble.radius + bubble.lead * closing - distance
-    inside = depth > 0.0
-    if not inside.any():
-        return np.zeros_like(points)
-    needed = depth / bubble.response + np.maximum(approach, 0.0)
-    missing = np.where(inside, np.maximum(needed - _along(wanted[row], heading), 0.0), 0.0)
-    direction = heading + _aside(heading, others.velocity - velocities[row], bubble.slip)
-    return _sum_rows(others, missing * direction, len(points))
+    relative = others.velocity - velocities[others.row]
+    depth = bubble.radius + bubble.lead * np.maximum(_along(relative, heading), 0.0) - distance
+    inside = np.flatnonzero(depth > 0.0)
+    if not len(inside):
+        return NOBODY
+    heading, relative = heading[inside], relative[inside]
+    approach = np.maximum(_along(others.velocity[inside], heading), 0.0)
+    return Threats(
+        row=others.row[inside],
+        heading=heading,
+        needed=depth[inside] / bubble.response + approach,
+        direction=heading + _aside(heading, relative, bubble.slip),
+    )
+
+
+def escape(wanted: Vec, pressing: Threats) -> Vec:
+    """Returns the velocity (n, 2) to add to `wanted` so that every threat is evaded fast enough, m/s."""
+    missing = np.maximum(pressing.needed - _along(wanted[pressing.row], pressing.heading), 0.0)
+    return _sum_rows(pressing.row, missing * pressing.direction, len(wanted))
 
 
 def columns_near(points: Vec, velocities: Vec, columns: Vec, bubble: Bubble) -> Encounters:
@@ -144,22 +175,22 @@ def _aside(heading: Vec, closing: Vec, slip: float) -> Vec:
     return np.where(_along(closing, heading) > STANDSTILL, side, 0.0) * across
 
 
-def _sum_rows(others: Encounters, pushes: Vec, n: int) -> Vec:
+def _sum_rows(row: npt.NDArray[np.intp], pushes: Vec, n: int) -> Vec:
     if n == 1:
         return np.add.reduce(pushes, axis=0, keepdims=True)
     total = np.empty((n, 2))
     for axis in (0, 1):
-        total[:, axis] = np.bincount(others.row, weights=pushes[:, axis], minlength=n)
+        total[:, axis] = np.bincount(row, weights=pushes[:, axis], minlength=n)
     return total
 
 
 def _along(vectors: Vec, heading: Vec) -> Vec:
-    along: Vec = np.einsum("ki,ki->k", vectors, heading)
+    along: Vec = np.vecdot(vectors, heading)
     return along[:, None]
 
 
 def _length(vectors: Vec) -> Vec:
-    lengths: Vec = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    lengths: Vec = np.sqrt(np.vecdot(vectors, vectors))
     return lengths[..., None]
 
 

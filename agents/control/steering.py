@@ -169,21 +169,25 @@ def _keep_off(wanted: Vec, trajectory: Trajectory, around: Surroundings, setting
     """
     point, moving = trajectory.point[:, :2], trajectory.velocity[:, :2]
     body, flying = around.position[:, :2], around.velocity[:, :2]
-    keep_off = [(body, flying, around.drones, DRONE_BUBBLE)]
+    pressing = [avoidance.threats(body, flying, around.drones, DRONE_BUBBLE)]
     push = avoidance.separation(point, around.drones, settings.avoidance.separation)
     if around.hand is not None:
-        keep_off += [(point, moving, around.hand, HAND_BUBBLE), (body, flying, around.hand, HAND_BUBBLE)]
+        pressing.append(avoidance.threats(point, moving, around.hand, HAND_BUBBLE))
+        pressing.append(avoidance.threats(body, flying, around.hand, HAND_BUBBLE))
         push += avoidance.separation(point, around.hand, settings.avoidance.separation)
     if len(settings.columns):
         columns = avoidance.columns_near(body, flying, settings.columns, COLUMN_BUBBLE)
-        keep_off.append((body, flying, columns, COLUMN_BUBBLE))
-    for _ in range(ROUNDS):
+        pressing.append(avoidance.threats(body, flying, columns, COLUMN_BUBBLE))
+    pressing = [each for each in pressing if len(each.row)]
+    for _ in range(ROUNDS if pressing else 0):
         before = push.copy()
-        for points, velocities, others, bubble in keep_off:
-            push += avoidance.escape(wanted[:, :2] + push, points, velocities, others, bubble)
-        if np.array_equal(push, before):
+        for each in pressing:
+            push += avoidance.escape(wanted[:, :2] + push, each)
+        if (push == before).all():
             break
-    return np.column_stack([push, np.zeros(len(push))])
+    planar = np.zeros_like(trajectory.point)
+    planar[:, :2] = push
+    return planar
 
 
 def _on_goal(trajectory: Trajectory) -> Mask:

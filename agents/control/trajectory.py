@@ -82,5 +82,5 @@ def limit(vectors: Vec, largest: float | Vec) -> Vec:
 
 def norm(vectors: Vec) -> Vec:
     """Returns the lengths (n, 1) of vectors (n, 3)."""
-    lengths: Vec = np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
+    lengths: Vec = np.sqrt(np.vecdot(vectors, vectors))
     return lengths[:, None]

@@ -46,7 +46,8 @@ SHAPES = (
 
 def say(what: str, worst: Distances) -> None:
     print(
-        f"{what}: {worst.drones.min():.3f} m drones, {worst.hand.min():.3f} m hand, {worst.outside.max():.3f} m out"
+        f"{what}: {worst.drones.min():.3f} m drones, {worst.hand.min():.3f} m hand,"
+        f" {worst.outside.max():.3f} m out"
     )
 
 
