@@ -15,7 +15,7 @@ help:  ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
 
 demo: $(RUNTIME)  ## fly the paper's rhombus for 30 s, simulated, one process per drone
-	$(BIN)/swarmtouch up rhombus --seconds 30
+	$(BIN)/swarmtouch up rhombus --seconds 30 --glove terminal://
 
 env: $(DEVELOPMENT)  ## set up everything that developing needs in .venv/
 

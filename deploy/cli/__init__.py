@@ -10,6 +10,7 @@ from shared.process import explain
 
 COMMANDS = {
     "up": "fly a scenario with real processes on this machine",
+    "glove": "show, play and compare tactile patterns",
     "sim": "fly a scenario on a virtual clock in one process",
     "scenarios": "list the scenarios that ship",
 }

@@ -11,6 +11,7 @@ While it flies: Ctrl-C lands and ends within 6 s, again: within 1 s; the space b
 Exit code 0: everybody landed, no process ended unexpectedly, no collision, no fence exit."""
 EXAMPLE = """swarmtouch up rhombus --seconds 30
          swarmtouch up maze --hand recording:flights/S2_visual_1
+         swarmtouch up maze --hand recording:flights/S2_visual_1 --glove terminal:// --patterns flight
          swarmtouch up line --set formation.n=8 --json"""
 
 
@@ -22,6 +23,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="URI",
         default="scripted:tour",
         help="hand source: scripted:NAME or recording:PATH (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--glove", metavar="URI", help="make the swarm felt: terminal:// or record://FILE (default: no glove)"
+    )
+    parser.add_argument(
+        "--patterns",
+        metavar="SET",
+        default="paper",
+        help="pattern set of the glove: see swarmtouch glove patterns (default: %(default)s)",
     )
     parser.add_argument(
         "--seconds", type=_seconds, metavar="S", help="land after S seconds (default: when the hand ends)"
@@ -53,11 +63,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Flies and returns the exit code."""
     from deploy.launcher.launch import Options, launch  # noqa: PLC0415  --help must not load the bus
+    from deploy.launcher.process_table import GloveChoice  # noqa: PLC0415
 
+    worn = GloveChoice(uri=arguments.glove, patterns=arguments.patterns) if arguments.glove else None
     summary = launch(
         Options(
             scenario=arguments.scenario,
             hand=arguments.hand,
+            glove=worn,
             seconds=arguments.seconds,
             overrides=tuple(arguments.overrides),
             runs=arguments.runs,

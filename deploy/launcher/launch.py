@@ -9,12 +9,14 @@ from rich.console import Console
 
 from deploy.launcher.console import open_console
 from deploy.launcher.flight import Flight, Outcome
+from deploy.launcher.glove_panel import GlovePanel
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.ports import free_ports
-from deploy.launcher.process_table import hint_overrides, process_table, resolve_scenario
+from deploy.launcher.process_table import GloveChoice, hint_overrides, process_table, resolve_scenario
 from deploy.launcher.run_directory import create_run_directory
 from deploy.launcher.status_view import StatusView
 from deploy.launcher.summary import Json, flight_summary, print_summary
+from glove_bridge.patterns import load_patterns
 from human_relay.sources import open_source, source_hints
 from shared.bus import ZenohBus
 from shared.clock import system_clock
@@ -35,6 +37,7 @@ class Options:
     Attributes:
         scenario: Name or file.
         hand: URI of the hand source.
+        glove: What the operator wears, None for nothing.
         seconds: Length of the flight, None until the hand ends it.
         overrides: `key=value` items for the scenario.
         runs: Directory of all runs.
@@ -45,7 +48,8 @@ class Options:
 
     scenario: str
     hand: str
-    seconds: float | None
+    glove: GloveChoice | None = None
+    seconds: float | None = None
     overrides: tuple[str, ...] = ()
     runs: Path = Path("runs")
     json: bool = False
@@ -84,6 +88,8 @@ def launch(options: Options) -> Json:
 
 def _resolve(options: Options) -> tuple[Scenario, Formation]:
     open_source(options.hand, start_ns=0).close()  # what it refuses is refused before anything starts
+    if options.glove:
+        load_patterns(options.glove.patterns)
     hints = hint_overrides(source_hints(options.hand))
     scenario = load_scenario(options.scenario, (*hints, *options.overrides))
     formation = build_formation(scenario, options.scenario)
@@ -101,12 +107,14 @@ async def _fly(
         file=run_dir / SCENARIO_FILE,
         hand=options.hand,
         run_dir=run_dir,
+        glove=options.glove,
         verbose=options.verbose,
     )
     live = options.live and console.is_terminal
+    panel = GlovePanel(options.glove.patterns) if options.glove else None
     with (
         ZenohBus(scenario.swarm.name, listen, connect) as bus,
-        StatusView(console, run_dir, live=live) as view,
+        StatusView(console, run_dir, live=live, panel=panel) as view,
     ):
         monitor = Monitor(bus, formation, system_clock())
         flight = Flight(
@@ -118,7 +126,7 @@ async def _fly(
             view=view,
         )
         outcome = await flight.run()
-    return outcome, flight_summary(outcome, monitor)
+    return outcome, flight_summary(outcome, monitor, glove=options.glove)
 
 
 def _refusal(outcome: Outcome, run_dir: Path) -> str:

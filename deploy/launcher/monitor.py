@@ -4,12 +4,13 @@ from collections import Counter
 from typing import TypeVar
 
 from observer.flight_stats import FlightStats
+from observer.glove_log import GloveLog
 from shared.clock import Clock
 from shared.codec import decode
 from shared.errors import DecodeError
 from shared.formation import Formation
-from shared.messages import DroneState, HandSample, Message, Mode, ProcessStatus, Wish
-from shared.topics import DRONE_STATE, HAND, STATUS, topic_of
+from shared.messages import DroneState, HandSample, Message, Mode, PatternEvent, ProcessStatus, Wish
+from shared.topics import DRONE_STATE, HAND, PATTERN, STATUS, topic_of
 from shared.transport import Arrival, Bus, Inbox
 
 INBOX_DEPTH = 4096
@@ -20,7 +21,7 @@ M = TypeVar("M", bound=Message)
 
 
 class Monitor:
-    """Listens to hand, states, health and presence; says nothing.
+    """Listens to hand, states, patterns, health and presence; says nothing.
 
     Args:
         bus: The observer's connection to the swarm.
@@ -30,12 +31,13 @@ class Monitor:
 
     def __init__(self, bus: Bus, formation: Formation, clock: Clock) -> None:
         self.stats = FlightStats(formation)
+        self.glove = GloveLog()
         self.present: set[str] = set()
         self.health: dict[str, Health] = {}
         self.rejected: Counter[str] = Counter()
         self._ids = formation.ids
         self._inbox = Inbox(clock, INBOX_DEPTH)
-        for topic in (HAND, DRONE_STATE, STATUS):
+        for topic in (HAND, DRONE_STATE, PATTERN, STATUS):
             bus.subscribe(topic.wildcard, self._inbox)
         bus.watch_presence(self._presence_changed)
 
@@ -49,6 +51,9 @@ class Monitor:
                 hands += self._decoded(arrivals, HandSample)
             elif topic is DRONE_STATE:
                 states += (s for s in self._decoded(arrivals, DroneState) if key == DRONE_STATE.key(id=s.id))
+            elif topic is PATTERN:
+                for event in self._decoded(arrivals, PatternEvent):
+                    self.glove.add(event)
             else:
                 for status in self._decoded(arrivals, ProcessStatus):
                     self.health.setdefault(f"{status.role}/{status.id}", Health()).add(status)

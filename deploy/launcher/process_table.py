@@ -16,7 +16,21 @@ from shared.scenario import Scenario
 
 WORLD = "world"
 DRONE = "drone"
+BRIDGE = "bridge"
 RELAY = "relay"
+
+
+@frozen(kw_only=True)
+class GloveChoice:
+    """What the operator wears.
+
+    Attributes:
+        uri: URI of the glove.
+        patterns: Name or file of the pattern set.
+    """
+
+    uri: str
+    patterns: str
 
 
 @frozen(kw_only=True)
@@ -49,7 +63,14 @@ class ProcessRow:
 
 
 def process_table(
-    scenario: Scenario, formation: Formation, *, file: Path, hand: str, run_dir: Path, verbose: bool = False
+    scenario: Scenario,
+    formation: Formation,
+    *,
+    file: Path,
+    hand: str,
+    run_dir: Path,
+    glove: GloveChoice | None = None,
+    verbose: bool = False,
 ) -> tuple[ProcessRow, ...]:
     """Derives the processes of a flight on this machine, in the order in which they start.
 
@@ -59,11 +80,12 @@ def process_table(
         file: Where the resolved scenario lies.
         hand: URI of the hand source.
         run_dir: Directory of this run.
+        glove: What the operator wears, None for nothing.
         verbose: Whether the processes log debugging details.
 
     Returns:
-        The world (if a vehicle is simulated), one agent per drone, and the relay last: a hand may only begin
-        to move when everybody listens.
+        The world (if a vehicle is simulated), one agent per drone, the bridge to the glove (if there is one),
+        and the relay last: a hand may only begin to move when everybody listens.
     """
     common = ("--scenario", str(file), *(("-v",) if verbose else ()))
     agents = tuple(
@@ -76,8 +98,10 @@ def process_table(
     relay = ProcessRow(
         role=RELAY, number=0, command=_python("human_relay", *common, "--hand", hand), takes_orders=True
     )
+    worn = ("--glove", glove.uri, "--patterns", glove.patterns) if glove else ()
+    bridge = ProcessRow(role=BRIDGE, number=0, command=_python("glove_bridge", *common, *worn))
     simulated = any((vehicle_settings(scenario, i).uri or "").startswith("sim:") for i in formation.ids)
-    return (*((world,) if simulated else ()), *agents, relay)
+    return (*((world,) if simulated else ()), *agents, *((bridge,) if glove else ()), relay)
 
 
 def resolve_scenario(

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from attrs import frozen
 from rich import box
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
 from deploy.launcher.flight import Flight
+from deploy.launcher.glove_panel import GlovePanel
 from deploy.launcher.process_table import DRONE
 from shared.messages import DroneState, Flag, ProcessStatus
 
@@ -111,10 +112,13 @@ class StatusView:
         console: Where.
         run_dir: Directory of the run, for the header.
         live: Whether to redraw a table in place; it needs a terminal.
+        panel: Shows the glove below the table, None without one.
     """
 
-    def __init__(self, console: Console, run_dir: Path, *, live: bool) -> None:
+    def __init__(self, console: Console, run_dir: Path, *, live: bool, panel: GlovePanel | None = None) -> None:
         self._console = console
+        self._panel = panel
+        self._fingers = ""
         self._run_dir = run_dir
         self._live = Live(console=console, auto_refresh=False, transient=True) if live else None
         self._period = LIVE_PERIOD_S if live else PLAIN_PERIOD_S
@@ -138,12 +142,14 @@ class StatusView:
             self._phase = flight.phase
             self.event(flight.phase)
             self._due = now + self._period
-        if now < self._due:
+        fingers = self._panel.line(flight.monitor.glove.latest) if self._panel else ""
+        if now < self._due and (not self._live or fingers == self._fingers):
             return
-        self._due = now + self._period
+        self._due, self._fingers = now + self._period, fingers
         rows = agent_rows(flight)
         if self._live:
-            self._live.update(status_table(rows, f"{flight.phase}: {self._run_dir}", _HINT), refresh=True)
+            table = status_table(rows, f"{flight.phase}: {self._run_dir}", _HINT)
+            self._live.update(Group(table, Text(fingers)) if fingers else table, refresh=True)
             return
         for line in plain_lines(rows):
             self._print(line)

@@ -10,25 +10,31 @@ from rich.table import Table
 
 from deploy.launcher.flight import Outcome
 from deploy.launcher.monitor import Monitor
-from deploy.launcher.process_table import DRONE
+from deploy.launcher.process_table import DRONE, GloveChoice
 from observer.agent_log import AgentSummary
+from observer.glove_log import GloveLog
 
 Json = dict[str, Any]
 
+_OUTCOMES = ("played", "suppressed", "failed")
 
-def flight_summary(outcome: Outcome, monitor: Monitor) -> Json:
+
+def flight_summary(outcome: Outcome, monitor: Monitor, glove: GloveChoice | None = None) -> Json:
     """Puts the numbers of a flight together.
 
     Args:
         outcome: How the flight went.
         monitor: What was heard of it.
+        glove: What the operator wore.
 
     Returns:
         The JSON contract: `ok` (no unexpected exit, all landed, and by the referee no collision and no fence
         exit), `seconds`, `restarts`, the referee's `min_distance_m`, `min_hand_distance_m`, `collisions`,
         `fence_exits` (null without a simulated world), `agents` with `id, steps, rate_hz, on_time, hand_used,
         tracking_rms_m, latency_ms {p50, p99}, cpu, rss_mb` each; and beyond the contract `landed`,
-        `formation` and, per agent, `lateness_ms`, `missed` and `restarts`.
+        `formation`, `glove` (null without one: `uri`, `patterns`, `played`, `suppressed` and `failed` by
+        pattern, `latency_ms` from the drone state to the first frame) and, per agent, `lateness_ms`,
+        `missed` and `restarts`.
     """
     referee = outcome.referee
     formation = attrs.asdict(monitor.stats.formation())
@@ -43,6 +49,7 @@ def flight_summary(outcome: Outcome, monitor: Monitor) -> Json:
         "fence_exits": _count(referee, "fence_exits"),
         "agents": [_agent(agent, outcome, monitor) for agent in monitor.stats.agents()],
         "formation": formation,
+        "glove": _glove(glove, monitor.glove) if glove else None,
     }
 
 
@@ -51,6 +58,8 @@ def print_summary(summary: Json, console: Console) -> None:
     console.print(_agent_table(summary["agents"]))
     if summary["formation"]["area_m2"]:
         console.print(_formation_table(summary["formation"]))
+    if summary["glove"]:
+        console.print(_glove_table(summary["glove"]))
     console.print(_referee_table(summary))
 
 
@@ -82,6 +91,17 @@ def _agent(agent: AgentSummary, outcome: Outcome, monitor: Monitor) -> Json:
     }
 
 
+def _glove(choice: GloveChoice, log: GloveLog) -> Json:
+    return {
+        "uri": choice.uri,
+        "patterns": choice.patterns,
+        "played": dict(log.played),
+        "suppressed": dict(log.suppressed),
+        "failed": dict(log.failed),
+        "latency_ms": log.latency_ms.quantiles()._asdict(),
+    }
+
+
 def _agent_table(agents: Iterable[Json]) -> Table:
     table = _table(
         "agents (times in ms: p50 / p99)",
@@ -108,6 +128,14 @@ def _formation_table(formation: Json) -> Table:
     table.add_row("area, m2", *_spread(formation["area_m2"]))
     for pair, spread in formation["distances_m"].items():
         table.add_row(f"distance {pair}, m", *_spread(spread))
+    return table
+
+
+def _glove_table(glove: Json) -> Table:
+    table = _table(f"glove {glove['uri']}, patterns {glove['patterns']}", "pattern", *_OUTCOMES)
+    for name in sorted({name for outcome in _OUTCOMES for name in glove[outcome]}):
+        table.add_row(name, *(str(glove[outcome].get(name, 0)) for outcome in _OUTCOMES))
+    table.caption = f"drone state to first frame, ms (p50 / p99): {_quantiles(glove['latency_ms'])}"
     return table
 
 

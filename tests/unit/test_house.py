@@ -17,6 +17,12 @@ PURE = [
     *(ROOT / f"agents/{name}.py" for name in ("agent", "settings", "stepping")),
     ROOT / "agents/vehicles/world/referee.py",
     *(ROOT / f"human_relay/{name}.py" for name in ("velocity", "relay")),
+    *(
+        ROOT / f"glove_bridge/{name}.py"
+        for name in ("formation_state", "meaning", "cues", "scheduler", "swarm_view", "distinctiveness")
+    ),
+    *sorted((ROOT / "glove_bridge/rules").glob("*.py")),
+    *(ROOT / f"glove_bridge/patterns/{name}.py" for name in ("pattern", "schema")),
     *(ROOT / f"observer/{name}.py" for name in ("flight_stats", "agent_log", "hand_log", "histogram")),
     *(
         ROOT / f"shared/{name}.py"

@@ -1,0 +1,1 @@
+"""Showing, playing and drawing tactile patterns."""

@@ -1,0 +1,33 @@
+"""`none://`: no glove. The state of the formation is still published, and every pattern fails."""
+
+from glove_bridge.gloves.base import Outcome, Report
+from glove_bridge.patterns.pattern import Pattern
+
+
+class AbsentGlove:
+    """A glove that is not there; see `Glove`."""
+
+    connected = False
+
+    def __init__(self, _: str = "") -> None:
+        """Takes the part of the URI after the scheme; there is nothing to choose."""
+        self._reports: list[Report] = []
+
+    def play(self, pattern: Pattern, now_ns: int) -> None:  # noqa: ARG002  interface
+        """See `Glove.play`."""
+        self._reports.append(Report(Outcome.FAILED, now_ns))
+
+    def poll(self, now_ns: int) -> list[Report]:  # noqa: ARG002  interface
+        """See `Glove.poll`."""
+        reports, self._reports = self._reports, []
+        return reports
+
+    def next_ns(self) -> int | None:
+        """See `Glove.next_ns`."""
+        return None
+
+    def stop(self, now_ns: int) -> None:
+        """See `Glove.stop`."""
+
+    def close(self) -> None:
+        """See `Glove.close`."""

@@ -1,0 +1,58 @@
+"""What a glove is to the bridge: it takes whole patterns and reports how they went."""
+
+import enum
+from typing import NamedTuple, Protocol
+
+from glove_bridge.patterns.pattern import Pattern
+
+
+class Outcome(enum.StrEnum):
+    """What became of a pattern."""
+
+    STARTED = "started"
+    FINISHED = "finished"
+    SUPPRESSED = "suppressed"
+    """It was wished for while the glove was busy, and no longer when it was free: no glove reports that."""
+    FAILED = "failed"
+    """It did not start, or was cut short."""
+
+
+class Report(NamedTuple):
+    """One step in the life of the pattern that was given last; at most `STARTED`, then one of the others.
+
+    Attributes:
+        outcome: `STARTED`, `FINISHED` or `FAILED`.
+        at_ns: When, on the clock of the process.
+    """
+
+    outcome: Outcome
+    at_ns: int
+
+
+class Glove(Protocol):
+    """Five vibrating fingertips. No call blocks, and none raises because the device is out of reach."""
+
+    @property
+    def connected(self) -> bool:
+        """Whether patterns can be felt."""
+        ...
+
+    def play(self, pattern: Pattern, now_ns: int) -> None:
+        """Starts a whole pattern; one that still plays fails."""
+        ...
+
+    def poll(self, now_ns: int) -> list[Report]:
+        """Moves on to `now_ns`; returns what has happened since the last call, oldest first."""
+        ...
+
+    def next_ns(self) -> int | None:
+        """Returns when to poll again; None while nothing plays."""
+        ...
+
+    def stop(self, now_ns: int) -> None:
+        """Silences every finger at once; what played fails."""
+        ...
+
+    def close(self) -> None:
+        """Silences every finger and releases the device; further calls do nothing."""
+        ...

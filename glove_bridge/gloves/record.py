@@ -1,0 +1,65 @@
+"""`record://FILE`: writes what a glove would do, one JSON object per line, flushed at once.
+
+`{"t_ns": ..., "pattern": "EI", "frame": 0, "hz": [0, 0, 150, 0, 0], "ms": 200}` for every frame, and with frame
+null and every finger at 0 when a pattern ends or is cut short.
+"""
+
+import io
+import json
+import logging
+
+from glove_bridge.gloves.timed import TimedGlove
+from glove_bridge.patterns.pattern import Frame, Pattern
+from glove_bridge.patterns.schema import FINGERS
+from shared.errors import ConfigError
+
+_log = logging.getLogger("glove")
+
+
+class RecordGlove(TimedGlove):
+    """Appends to a file.
+
+    Args:
+        path: The part of the URI after the scheme.
+
+    Raises:
+        ConfigError: No path, or the file cannot be written.
+    """
+
+    def __init__(self, path: str) -> None:
+        super().__init__()
+        if not path:
+            raise ConfigError("record://: no file; for example record://patterns.jsonl")
+        try:
+            # Unbuffered: every frame is in the file when it starts, and closing cannot fail.
+            self._file: io.FileIO | None = io.FileIO(path, "ab")
+        except OSError as error:
+            raise ConfigError(f"record://{path}: cannot be written: {error}; choose another file") from error
+
+    @property
+    def connected(self) -> bool:
+        """See `Glove.connected`."""
+        return self._file is not None
+
+    def close(self) -> None:
+        """See `Glove.close`."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def _show(self, pattern: Pattern | None, frame: Frame | None, now_ns: int) -> None:
+        if self._file is None:
+            return
+        hz = frame.hz if frame else {}
+        line = {
+            "t_ns": now_ns,
+            "pattern": pattern.name if pattern else None,
+            "frame": self._frame if frame else None,
+            "hz": [hz.get(finger, 0.0) for finger in FINGERS],
+            "ms": frame.ms if frame else 0,
+        }
+        try:
+            self._file.write(f"{json.dumps(line)}\n".encode())
+        except OSError as error:
+            _log.warning("cannot write %s any more: %s; no patterns are recorded", self._file.name, error)
+            self.close()

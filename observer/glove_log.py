@@ -1,0 +1,44 @@
+"""What the operator felt, from the pattern events alone: messages in, numbers out; no clock, no I/O."""
+
+from collections import Counter
+
+from observer.histogram import Histogram
+from shared.messages import PatternEvent
+from shared.topics import DRONE_STATE
+
+_DRONE = DRONE_STATE.pattern.split("{", maxsplit=1)[0]
+
+
+class GloveLog:
+    """Counts pattern events.
+
+    Attributes:
+        latest: The last event of a pattern that reached the glove, None before the first.
+        played: Patterns that have ended, by name.
+        suppressed: Patterns that were wished for while the glove was busy, by name.
+        failed: Patterns that did not start or were cut short, by name.
+        latency_ms: From the arrival of the newest drone state that brought a pattern about to its first frame.
+    """
+
+    def __init__(self) -> None:
+        self.latest: PatternEvent | None = None
+        self.played: Counter[str] = Counter()
+        self.suppressed: Counter[str] = Counter()
+        self.failed: Counter[str] = Counter()
+        self.latency_ms = Histogram()
+
+    def add(self, event: PatternEvent) -> None:
+        """Takes the next event."""
+        counts = {"finished": self.played, "suppressed": self.suppressed, "failed": self.failed}
+        if event.outcome in counts:
+            counts[event.outcome][event.pattern] += 1
+        if event.outcome == "started":
+            self._add_latency(event)
+        if event.outcome != "suppressed":
+            self.latest = event
+
+    def _add_latency(self, event: PatternEvent) -> None:
+        """Arrival and first frame are both on the bridge's clock."""
+        arrivals = [heard.arrival_ns for key, heard in event.heard.items() if key.startswith(_DRONE)]
+        if arrivals and event.started_ns >= max(arrivals):
+            self.latency_ms.add((event.started_ns - max(arrivals)) / 1e6)
