@@ -38,7 +38,7 @@ def main() -> int:
         )
     except SwarmTouchError as error:
         return explain("agents", error)
-    inbox = Inbox(clock)
+    inbox = Inbox(clock, wakes_for=agent.triggers)
     with bus:
         for key in agent.senses.keys:
             bus.subscribe(key, inbox)

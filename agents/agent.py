@@ -50,6 +50,11 @@ class Agent:
         self._used: dict[str, Heard] = {}
         self._last_step_ns = 0
 
+    @property
+    def triggers(self) -> frozenset[str]:
+        """Returns the keys that a step may wait for; whom it only avoids never triggers one."""
+        return frozenset([HAND_KEY, *self._references.values()])
+
     def receive(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Takes in what the bus delivered."""
         self.senses.take(arrivals)
@@ -102,15 +107,21 @@ class Agent:
         return state
 
     def _inputs_complete(self, now_ns: int) -> bool:
-        """Says whether the hand and every reference that is alive are newer than at the last step."""
-        hand = self.senses.hand
-        fresh = [
-            self._is_fresh(key, sensed)
+        """Says whether the hand and every reference that is alive are newer than at the last step.
+
+        References that have caught up with the hand of the last step do not wait for the next hand: a step
+        that was too early for them would otherwise leave every later one a whole period behind.
+        """
+        live = [
+            (key, sensed)
             for other, key in self._references.items()
             if (sensed := self.senses.drones.get(other)) and sensed.age(now_ns) <= REFERENCE_LOST
         ]
+        fresh = [self._is_fresh(key, sensed) for key, sensed in live]
+        hand = self.senses.hand
         if hand is not None and hand.age(now_ns) <= HAND_STALE:
-            fresh.append(self._is_fresh(HAND_KEY, hand))
+            caught_up = bool(live) and all(_has_used(sensed.message, hand.message) for _, sensed in live)
+            fresh.append(caught_up or self._is_fresh(HAND_KEY, hand))
         return bool(fresh) and all(fresh)
 
     def _is_fresh(self, key: str, sensed: Sensed[HandSample] | Sensed[DroneState]) -> bool:
@@ -128,7 +139,7 @@ class Agent:
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
             references=tuple(self._reference(other, key, now_ns) for other, key in self._references.items()),
-            drones=_encounters([sensed.message for sensed in self.senses.drones.values()]),
+            drones=_encounters(list(self.senses.drones.values()), now_ns),
         )
 
     def _reference(self, other: int, key: str, now_ns: int) -> Reference | None:
@@ -154,6 +165,11 @@ class Agent:
         return heard
 
 
+def _has_used(state: DroneState, hand: HandSample) -> bool:
+    heard = state.heard.get(HAND_KEY)
+    return heard is not None and (heard.epoch, heard.seq) == (hand.epoch, hand.seq)
+
+
 def hand_input(sample: HandSample) -> HandInput:
     """Returns a sample as the control law takes it."""
     return HandInput(
@@ -165,11 +181,16 @@ def hand_input(sample: HandSample) -> HandInput:
     )
 
 
-def _encounters(states: Sequence[DroneState]) -> Encounters:
+def _encounters(drones: Sequence[Sensed[DroneState]], now_ns: int) -> Encounters:
+    """Returns where the other drones are; a silent one stays there, but no longer comes closer."""
+    live = [sensed.age(now_ns) <= DRONE_STATE.stale_s for sensed in drones]
+    velocity = [
+        s.message.velocity[:2] if is_live else (0.0, 0.0) for s, is_live in zip(drones, live, strict=True)
+    ]
     return Encounters(
-        row=np.zeros(len(states), dtype=np.intp),
-        position=np.array([state.position[:2] for state in states]).reshape(-1, 2),
-        velocity=np.array([state.velocity[:2] for state in states]).reshape(-1, 2),
+        row=np.zeros(len(drones), dtype=np.intp),
+        position=np.array([sensed.message.position[:2] for sensed in drones]).reshape(-1, 2),
+        velocity=np.array(velocity).reshape(-1, 2),
     )
 
 

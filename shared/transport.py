@@ -5,7 +5,7 @@ Backends: `shared.bus` (Zenoh) and `shared.memory_bus` (one process, for simulat
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from typing import NamedTuple, Protocol, Self
 
 from shared.clock import Clock
@@ -30,11 +30,13 @@ class Inbox:
     Args:
         clock: Stamps arrivals.
         depth: Samples kept per key; when full the oldest is dropped and counted in `dropped`.
+        wakes_for: Keys whose arrival ends a `wait`; None for all.
     """
 
-    def __init__(self, clock: Clock, depth: int = PENDING_PER_KEY) -> None:
+    def __init__(self, clock: Clock, depth: int = PENDING_PER_KEY, wakes_for: Set[str] | None = None) -> None:
         self._clock = clock
         self._depth = depth
+        self._wakes_for = wakes_for
         self._pending: dict[str, deque[Arrival]] = {}
         self._lock = threading.Lock()
         self._filled = threading.Event()
@@ -49,7 +51,8 @@ class Inbox:
                 queue.popleft()
                 self.dropped += 1
             queue.append(arrival)
-        self._filled.set()
+        if self._wakes_for is None or key in self._wakes_for:
+            self._filled.set()
 
     def take(self) -> dict[str, list[Arrival]]:
         """Returns what has arrived since the last call, per key, oldest first, and empties the inbox."""
@@ -60,7 +63,7 @@ class Inbox:
         return taken
 
     def wait(self, timeout_s: float) -> bool:
-        """Blocks until something arrives, at most `timeout_s`; returns whether something is there."""
+        """Blocks until something that wakes arrives, at most `timeout_s`; returns whether it did."""
         return self._filled.wait(max(0.0, timeout_s))
 
     def wake(self) -> None:

@@ -86,7 +86,8 @@ def map_hand(previous: MappedHand | None, sample: HandInput, settings: HandSetti
     target, velocity = _target(sample, settings)
     yaw = sample.yaw if settings.hand.follow_yaw else 0.0
     if previous is None:
-        return MappedHand(point=target, velocity=velocity, yaw=yaw, yaw_rate=0.0, stamp=sample.stamp)
+        capped = _capped(velocity, settings.hand.max_speed)
+        return MappedHand(point=target, velocity=capped, yaw=yaw, yaw_rate=0.0, stamp=sample.stamp)
     dt = min(max(sample.stamp - previous.stamp, 0.0), MAX_SAMPLE_GAP)
     point, velocity = _chase(previous.point, target, velocity, settings.hand.max_speed, dt)
     turned, yaw_rate = _turn(previous.yaw, yaw, OUTERMOST_SPEED / max(settings.radius, 0.1), dt)
@@ -119,8 +120,12 @@ def _chase(point: Vec, target: Vec, velocity: Vec, max_speed: float, dt: float) 
     if distance > max_speed * dt:
         heading = way / distance
         return point + heading * max_speed * dt, heading * max_speed
+    return target, _capped(velocity, max_speed)
+
+
+def _capped(velocity: Vec, max_speed: float) -> Vec:
     speed = math.sqrt(velocity @ velocity)
-    return target, velocity if speed <= max_speed else velocity * (max_speed / speed)
+    return velocity if speed <= max_speed else velocity * (max_speed / speed)
 
 
 def _turn(yaw: float, target: float, max_rate: float, dt: float) -> tuple[float, float]:

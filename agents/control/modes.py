@@ -36,7 +36,6 @@ class ModeInputs:
         pose_age: Time since the vehicle's newest pose arrived, s; infinite before the first.
         height: Height of the body, m.
         takeoff_height: Height at which it joins the formation, m.
-        references_usable: Every reference is heard and part of the formation.
         references_follow: Every reference is in FOLLOW.
     """
 
@@ -45,7 +44,6 @@ class ModeInputs:
     pose_age: float
     height: float
     takeoff_height: float
-    references_usable: bool
     references_follow: bool
 
 
@@ -110,7 +108,7 @@ def _landing(state: ModeState, inputs: ModeInputs) -> ModeState:
 
 def _land(state: ModeState, inputs: ModeInputs) -> ModeState:
     wished = _landing_wished(inputs) and inputs.hand_age <= HAND_LAND
-    return ModeState(mode=Mode.LAND, must_ask_again=state.must_ask_again or not wished)
+    return evolve(state, mode=Mode.LAND, must_ask_again=not wished)
 
 
 def _landing_wished(inputs: ModeInputs) -> bool:

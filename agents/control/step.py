@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
 from agents.control import modes
 from agents.control.avoidance import Encounters
@@ -11,10 +11,10 @@ from agents.control.goals import Rows, corrections, goal_velocities, goals, plac
 from agents.control.hand import HandInput, HandSettings, MappedHand, freeze, map_hand
 from agents.control.impedance import LinkState, rest_state, step_links, transition_rows
 from agents.control.modes import ModeInputs, ModeState, next_mode
-from agents.control.steering import SteeringSettings, Surroundings, steer
+from agents.control.steering import LONGEST_STEP, SteeringSettings, Surroundings, steer
 from agents.control.trajectory import Trajectory, start_at
 from shared.formation import Vec
-from shared.messages import Flag, Mode, Wish
+from shared.messages import MAX_POSITION, MAX_VELOCITY, Flag, Mode, Wish
 
 REFERENCE_LOST = 0.5
 """A reference unheard for this long is lost, s."""
@@ -165,7 +165,7 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
         goal, goal_velocity = _law(inputs, hand, links, settings)
         anchor = state.trajectory.point[0]
     else:
-        anchor = goal = _own_goal(state, mode.mode, inputs.position, settings, dt)
+        anchor = goal = _own_goal(state, mode.mode, inputs.position, settings, min(dt, LONGEST_STEP))
         goal_velocity = np.zeros(3)
 
     trajectory = state.trajectory if mode.mode in modes.AIRBORNE_MODES else start_at(inputs.position[None, :])
@@ -200,7 +200,6 @@ def _mode_inputs(inputs: Inputs, settings: Settings, *, usable: bool) -> ModeInp
         pose_age=inputs.pose_age,
         height=float(inputs.position[2]),
         takeoff_height=settings.takeoff_height,
-        references_usable=usable,
         references_follow=follow,
     )
 
@@ -234,7 +233,12 @@ def _law(inputs: Inputs, hand: MappedHand, links: LinkState, settings: Settings)
     goal = goals(rows, points, correction, hand.yaw)
     places = place_velocities(rows, correction, rate, hand.yaw, hand.yaw_rate)
     goal_velocity = goal_velocities(rows, velocities, places)
-    return goal[0], goal_velocity[0]
+    # A goal that no receiver would accept, because a reference is at the edge of the range, helps nobody.
+    return _within(goal[0], MAX_POSITION), _within(goal_velocity[0], MAX_VELOCITY)
+
+
+def _within(vector: Vec, largest: float) -> Vec:
+    return np.minimum(np.maximum(vector, -largest), largest)
 
 
 def _extrapolated(reference: Reference) -> Vec:
@@ -259,20 +263,21 @@ def _own_goal(state: State, mode: Mode, position: Vec, settings: Settings, dt: f
 
 
 def _surroundings(inputs: Inputs) -> Surroundings:
-    hand = inputs.hand
-    return Surroundings(
+    """Returns who is around; a silent hand stays where it was, but no longer comes closer."""
+    around = Surroundings(
         position=inputs.position[None, :],
         velocity=inputs.velocity[None, :],
         drones=inputs.drones,
-        hand=None
-        if hand is None
-        else Encounters(
-            row=np.zeros(1, dtype=np.intp),
-            position=hand.position[None, :2],
-            velocity=hand.velocity[None, :2],
-        ),
-        hand_speed=0.0 if hand is None else math.sqrt(hand.velocity @ hand.velocity),
+        hand=None,
+        hand_speed=0.0,
     )
+    if inputs.hand is None:
+        return around
+    velocity = inputs.hand.velocity if inputs.hand_age <= modes.HAND_STALE else np.zeros(3)
+    hand = Encounters(
+        row=np.zeros(1, dtype=np.intp), position=inputs.hand.position[None, :2], velocity=velocity[None, :2]
+    )
+    return evolve(around, hand=hand, hand_speed=math.sqrt(velocity @ velocity))
 
 
 def _flags(inputs: Inputs, *, usable: bool, fenced: bool, avoiding: bool) -> Flag:

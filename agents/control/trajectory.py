@@ -39,7 +39,8 @@ def start_at(points: Vec) -> Trajectory:
 def tracking_velocity(trajectory: Trajectory, goal: Vec, dt: float, acceleration: float) -> Vec:
     """Returns the velocity (n, 3) that reaches the goal at once, or closes in on it without overshoot.
 
-    In the frame of the moving goal the distance is closed at most as fast as it can be braked away.
+    In the frame of the moving goal the distance is closed at most as fast as it can be braked away; what
+    the finite step adds is 0.6 acceleration dt^2, half a millimetre at 60 Hz.
 
     Args:
         trajectory: Reference before the step.

@@ -152,6 +152,25 @@ def test_it_steps_once_hand_and_every_live_reference_are_new() -> None:
     assert brain.due_ns(T0 + MS) == fast
 
 
+def test_references_that_catch_up_with_the_hand_do_not_wait_for_the_next_one() -> None:
+    brain = agent(4)
+    hear(brain, T0, hand(1), state(2, 0), state(3, 0))
+    brain.step(T0, FLYING, 0.0)
+    now, used = T0 + 3 * MS, {HAND.key(): Heard(T0, 1, T0)}
+    hear(brain, now, evolve(state(2, 1), heard=used))
+    assert brain.due_ns(now) == T0 + 25 * MS, "drone 3 has not caught up"
+    hear(brain, now, evolve(state(3, 1), heard=used))
+    assert brain.due_ns(now) == T0 + 8_333_333
+    brain.step(T0 + 9 * MS, FLYING, 0.0)
+    hear(brain, T0 + 17 * MS, hand(2))
+    assert brain.due_ns(T0 + 17 * MS) == T0 + 34 * MS, "and now it is in step with them again"
+
+
+def test_only_the_hand_and_references_trigger_a_step() -> None:
+    assert agent(4).triggers == {HAND.key(), TWO, THREE}
+    assert agent(1).triggers == {HAND.key()}
+
+
 def test_it_does_not_wait_for_a_reference_that_is_lost_nor_for_a_silent_hand() -> None:
     brain = agent(4)
     hear(brain, T0, hand(0), state(2, 0), state(3, 0))

@@ -116,3 +116,12 @@ def test_an_arrival_during_a_take_is_not_forgotten() -> None:
     assert taken == [{"a": [Arrival(b"1", 0)]}]
     assert inbox.wait(0.0)
     assert inbox.take() == {"a": [Arrival(b"2", 1)]}
+
+
+def test_only_chosen_keys_wake() -> None:
+    inbox = Inbox(lambda: 0, wakes_for={"human/hand"})
+    inbox.put("drone/1/state", b"1")
+    assert not inbox.wait(0.0)
+    inbox.put("human/hand", b"2")
+    assert inbox.wait(0.0)
+    assert set(inbox.take()) == {"drone/1/state", "human/hand"}
