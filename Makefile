@@ -19,11 +19,13 @@ demo: $(RUNTIME)  ## fly the paper's rhombus for 30 s, simulated, one process pe
 
 env: $(DEVELOPMENT)  ## set up everything that developing needs in .venv/
 
+# Flights with real processes want the machine to themselves; everything else shares it.
 test: lint  ## everything CI runs: format, lint, types, import contracts, all tests
-	$(BIN)/pytest -m "not chip and not browser and not container"
+	$(BIN)/pytest --numprocesses auto tests/unit tests/contract tests/replay
+	$(BIN)/pytest tests/integration
 
 check: lint  ## the quick gate: format, lint, types, import contracts, unit tests
-	$(BIN)/pytest tests/unit
+	$(BIN)/pytest --numprocesses auto -m "not slow" tests/unit
 
 lint: $(DEVELOPMENT)
 	$(BIN)/ruff format --check .

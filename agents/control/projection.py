@@ -16,6 +16,9 @@ SWEPT_MARGIN = 0.06
 TOLERANCE = 1e-9
 """Depth inside a circle that counts as on it, m."""
 
+CENTRE = 1e-12
+"""A point this near to a centre is on it: it has no radial direction, m."""
+
 
 def project_exact(points: Vec, columns: Vec, radius: float) -> Vec:
     """Moves points radially out of every circle that they are in, one circle after the other, in order.
@@ -34,7 +37,8 @@ def project_exact(points: Vec, columns: Vec, radius: float) -> Vec:
     for centre in columns:
         away = points - centre
         distance = np.hypot(away[..., :1], away[..., 1:])
-        direction = np.where(distance > 0.0, away / np.where(distance > 0.0, distance, 1.0), (1.0, 0.0))
+        off_centre = distance > CENTRE
+        direction = np.where(off_centre, away / np.where(off_centre, distance, 1.0), (1.0, 0.0))
         points = np.where(distance < radius, centre + radius * direction, points)
     return points
 

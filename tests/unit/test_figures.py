@@ -10,6 +10,8 @@ from shared.config import load_scenario
 from shared.formation import build_formation
 from tests.hands import stroke
 
+pytestmark = pytest.mark.slow
+
 Vec = npt.NDArray[np.float64]
 
 FORWARD, RIGHT = np.pi, np.pi / 2.0

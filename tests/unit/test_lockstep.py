@@ -21,6 +21,8 @@ from shared.scenario import Scenario
 from tests.hands import RATE_HZ, REST, samples_of, still, stroke
 from tests.runs import distances, fly_all
 
+pytestmark = pytest.mark.slow
+
 SLOW = 0.25
 """Peak speed at which nobody has to keep off anybody, m/s."""
 

@@ -21,6 +21,8 @@ from shared.scenario import Obstacle, Scenario
 from tests.hands import samples_of, stroke
 from tests.runs import Distances, distances, fly_all, record_distances
 
+pytestmark = pytest.mark.slow
+
 Vec = npt.NDArray[np.float64]
 
 KEEP = 0.30
