@@ -1,0 +1,1 @@
+"""The bench: what the swarm costs, measured against the floor of its transport in the same run."""

@@ -1,0 +1,148 @@
+"""`bench chain`: from the hand to the set-point of the last drone, against two floors in the same run.
+
+Three swarms of the same shape take turns, A B C A B C: real agents in a simulated flight, bare nodes over Zenoh
+with the same links, subscriptions and payload sizes, and bare nodes over UDP sockets. A latency runs from the
+stamp of a hand sample to the stamp of the first set-point that contains it through every hop.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from deploy.bench.figures import TEXT_COLUMNS, Spread, spread
+from deploy.bench.flight_ear import HopTimes
+from deploy.bench.report import Json, Report, Sheet
+from deploy.bench.swarm import BenchError, Edit, fly, fly_bare_udp, fly_bare_zenoh
+from shared.config import load_scenario
+from shared.formation import build_formation
+
+NAMES = {"real": "agents", "zenoh": "bare nodes, Zenoh", "udp": "bare nodes, UDP sockets"}
+HOP_PARTS = ("transport", "wake", "step")
+
+
+def measure(
+    *,
+    scenario: str = "rhombus",
+    seconds: float,
+    rounds: int,
+    overrides: Sequence[str] = (),
+    edit: Edit = lambda row: row,
+    say: Callable[[str], None] = lambda _: None,
+) -> Report:
+    """Measures the chain.
+
+    Args:
+        scenario: Whose chain; the latency is that of its deepest drone.
+        seconds: How long each of the three is measured, all rounds together.
+        rounds: How often they take turns.
+        overrides: `key=value` items for the scenario.
+        edit: Changes rows of the process table of the real swarm.
+        say: Told what is going on.
+
+    Raises:
+        ConfigError: The scenario is refused.
+        BenchError: Somebody ended, or nothing came through.
+    """
+    settings = load_scenario(scenario, overrides)
+    formation = build_formation(settings, scenario)
+    last = formation.ids[formation.levels[-1][-1]]
+    taken: dict[str, list[list[float]]] = {name: [] for name in NAMES}
+    hops: dict[int, list[HopTimes]] = {drone: [] for drone in formation.ids}
+    sizes: dict[int, int] = {}
+    for turn in range(rounds):
+        say(f"round {turn + 1} of {rounds}: agents")
+        flight, _ = fly(settings, formation, seconds / rounds, edit=edit)
+        taken["real"].append(flight.stats.latencies_ms[last])
+        for drone, times in flight.stats.hops.items():
+            hops[drone].append(times)
+        sizes = sizes or flight.payload_bytes()
+        for name, fly_bare in (("zenoh", fly_bare_zenoh), ("udp", fly_bare_udp)):
+            say(f"round {turn + 1} of {rounds}: {NAMES[name]}")
+            ear, _ = fly_bare(settings, formation, sizes, seconds / rounds)
+            taken[name].append(ear.latencies_ms[last])
+            if ear.payload_bytes != sizes:
+                raise BenchError(f"{NAMES[name]} sent {ear.payload_bytes} bytes instead of {sizes}")
+    for name, turns in taken.items():
+        if not all(turns):
+            raise BenchError(f"{NAMES[name]}: no hand sample came through to drone {last}; measure longer")
+    return _report(taken, _hop_medians(hops), sizes)
+
+
+def _report(taken: dict[str, list[list[float]]], hops: dict[int, Json], sizes: dict[int, int]) -> Report:
+    pooled = {name: [value for turn in turns for value in turn] for name, turns in taken.items()}
+    of = {name: spread(values) for name, values in pooled.items()}
+    record = {
+        "p50_ms": of["real"].p50,
+        "p99_ms": of["real"].p99,
+        "floor_p50_ms": of["zenoh"].p50,
+        "udp_p50_ms": of["udp"].p50,
+        "ratio": of["real"].p50 / of["zenoh"].p50,
+        "n": of["real"].n,
+        "floor_p99_ms": of["zenoh"].p99,
+        "udp_p99_ms": of["udp"].p99,
+        "floor_ratio": of["zenoh"].p50 / of["udp"].p50,
+        "ratio_by_round": _ratios(taken["real"], taken["zenoh"]),
+        "floor_ratio_by_round": _ratios(taken["zenoh"], taken["udp"]),
+        "floor_n": of["zenoh"].n,
+        "udp_n": of["udp"].n,
+        "payload_bytes": {str(node): size for node, size in sorted(sizes.items())},
+        "hops": hops,
+    }
+    return Report(
+        name="chain",
+        records=(record,),
+        sheets=(_latency_sheet(of, record), _hop_sheet(hops)),
+        draw=lambda figure: _draw(figure, pooled),
+    )
+
+
+def _ratios(above: Sequence[Sequence[float]], below: Sequence[Sequence[float]]) -> list[float]:
+    """Returns the ratio of the medians, round by round: its spread says how far the ratio can be trusted."""
+    return [float(np.median(a) / np.median(b)) for a, b in zip(above, below, strict=True)]
+
+
+def _hop_medians(hops: dict[int, list[HopTimes]]) -> dict[int, Json]:
+    def median(drone: int, part: str) -> float:
+        values = [value for times in hops[drone] for value in getattr(times, part)]
+        return float(np.median(values)) if values else 0.0
+
+    return {drone: {f"{part}_ms": median(drone, part) for part in HOP_PARTS} for drone in hops}
+
+
+def _latency_sheet(of: dict[str, Spread], record: Json) -> Sheet:
+    def row(name: str, ratios: Sequence[float]) -> tuple[str, ...]:
+        ratio = f"{min(ratios):.2f} to {max(ratios):.2f}" if ratios else ""
+        return (NAMES[name], *of[name].text(), ratio)
+
+    return Sheet(
+        title="Hand to the last drone's set-point, ms",
+        columns=("", *TEXT_COLUMNS, "times the row below, by round"),
+        rows=(
+            row("real", record["ratio_by_round"]),
+            row("zenoh", record["floor_ratio_by_round"]),
+            row("udp", ()),
+        ),
+    )
+
+
+def _hop_sheet(hops: dict[int, Json]) -> Sheet:
+    rows = (
+        (f"drone {drone}", *(f"{times[f'{part}_ms']:.2f}" for part in HOP_PARTS))
+        for drone, times in hops.items()
+    )
+    return Sheet(
+        title="Of that, agents: medians from the last input of a step on, ms",
+        columns=("", "encoding and transport", "wake-up and decoding", "step and command"),
+        rows=tuple(rows),
+    )
+
+
+def _draw(figure: Any, pooled: dict[str, list[float]]) -> None:
+    axes = figure.subplots()
+    for name, values in pooled.items():
+        axes.plot(np.sort(values), np.arange(1, len(values) + 1) / len(values), label=NAMES[name])
+    axes.set(
+        xscale="log", xlabel="latency from the hand to the last drone's set-point, ms", ylabel="share below"
+    )
+    axes.legend()

@@ -1,0 +1,152 @@
+"""`swarmtouch bench`: what the swarm costs, against the floor of its transport in the same run."""
+
+import argparse
+import importlib
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+DESCRIPTION = """Measures on this machine: latency from the hand to the drones, cost of a control step, many
+agents, the simulators, the start. Real swarms and bare ones (same processes, links and payload sizes, no
+control) take turns in the same run, so that load on the machine meets both. Method: docs/performance.md."""
+EXAMPLE = """swarmtouch bench chain --seconds 20 --json
+         swarmtouch bench scale --agents 4,8,16,32 --plot scale.svg
+         swarmtouch bench step --update docs/performance.md"""
+
+Declare = Callable[[argparse.ArgumentParser], object]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares what can be measured, each with its own arguments."""
+    kinds = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
+    for what, kind in _KINDS.items():
+        example = f"example: swarmtouch bench {what} {kind.example}"
+        child = kinds.add_parser(what, help=kind.summary, description=kind.summary, epilog=example)
+        for declare in (*kind.arguments, _common(kind.scenario)):
+            declare(child)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measures, prints, and returns the exit code."""
+    # Before numpy is loaded: one core is one core, and the matrices are tiny.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from deploy.bench.machine import Conditions  # noqa: PLC0415  --help must not load numpy
+    from deploy.bench.plot import check_plot, save_plot  # noqa: PLC0415
+    from deploy.bench.report import print_report, split_at_block, write_block  # noqa: PLC0415
+    from deploy.launcher.console import open_console  # noqa: PLC0415
+
+    if arguments.plot:
+        check_plot(arguments.plot)
+    if arguments.update:
+        split_at_block(arguments.what, arguments.update)
+    measure = importlib.import_module(f"deploy.bench.{arguments.what}").measure
+    outputs = ("command", "what", "json", "plot", "update")
+    options = {name: value for name, value in vars(arguments).items() if name not in outputs}
+    conditions = Conditions()
+    try:
+        report = measure(**options, say=lambda text: print(f"bench | {text}", file=sys.stderr, flush=True))
+    except KeyboardInterrupt:
+        print("swarmtouch: interrupted, nothing was measured", file=sys.stderr)
+        return 1
+    met = conditions.text()
+    print_report(report, met, open_console(stderr=arguments.json))
+    if arguments.plot:
+        save_plot(report, arguments.plot)
+    if arguments.update:
+        write_block(report, met, arguments.update)
+    if arguments.json:
+        for record in report.records:
+            print(json.dumps(record | {"others_cores": conditions.others_cores()}), flush=True)
+    return 0
+
+
+def _common(scenario: str) -> Declare:
+    def declare(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument("--scenario", default=scenario, help="what flies (default: %(default)s)")
+        parser.add_argument(
+            "--set",
+            dest="overrides",
+            action="append",
+            default=[],
+            metavar="KEY=VALUE",
+            help="override a key of the scenario; repeatable",
+        )
+        parser.add_argument("--json", action="store_true", help="one line of JSON per measurement on stdout")
+        parser.add_argument("--plot", type=Path, metavar="FILE", help="draw it (.svg, .png; needs matplotlib)")
+        parser.add_argument("--update", type=Path, metavar="FILE", help="replace its table in a Markdown file")
+
+    return declare
+
+
+def _option(name: str, kind: Callable[[str], Any], default: str, text: str) -> Declare:
+    return lambda parser: parser.add_argument(
+        f"--{name}", type=kind, default=default, metavar="N", help=f"{text} (default: %(default)s)"
+    )
+
+
+def _positive(kind: type[float] | type[int]) -> Callable[[str], Any]:
+    def parse(text: str) -> float | int:
+        value = kind(text)
+        if not 0 < value < float("inf"):
+            raise argparse.ArgumentTypeError(f"{text} must be more than 0")
+        return value
+
+    return parse
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(_positive(int)(part) for part in text.split(","))
+
+
+def _seconds(default: str) -> Declare:
+    return _option("seconds", _positive(float), default, "time that counts, per swarm, s")
+
+
+def _rounds(default: str) -> Declare:
+    return _option("rounds", _positive(int), default, "how often the swarms take turns")
+
+
+def _number(default: str) -> Declare:
+    return _option("n", _positive(int), default, "how many are measured")
+
+
+def _sizes(name: str, default: str) -> Declare:
+    return _option(name, _numbers, default, "sizes of the swarms")
+
+
+class Kind(NamedTuple):
+    """One thing to measure: what it is, an example, what flies, and the arguments that it takes."""
+
+    summary: str
+    example: str
+    scenario: str
+    arguments: tuple[Declare, ...]
+
+
+_KINDS = {
+    "chain": Kind(
+        "hand to the last drone's set-point, against bare Zenoh and raw UDP sockets",
+        "--seconds 20",
+        "rhombus",
+        (_seconds("20"), _rounds("4")),
+    ),
+    "step": Kind("one control step, decoding included", "--n 3000", "rhombus", (_number("3000"),)),
+    "scale": Kind(
+        "many agents: punctuality, CPU against a bare node, memory",
+        "--agents 4,8,16",
+        "grid",
+        (_sizes("agents", "4,8,16,32"), _seconds("10"), _rounds("2")),
+    ),
+    "lockstep": Kind(
+        "the simulators against real time",
+        "--drones 4,100,1000",
+        "grid",
+        (_sizes("drones", "4,100,1000"), _seconds("5")),
+    ),
+    "start": Kind(
+        "from `swarmtouch up` to the first formation-wide step", "--n 10", "rhombus", (_number("10"),)
+    ),
+}
