@@ -13,7 +13,7 @@ from shared.config import load_scenario, vehicle_settings
 from shared.errors import SwarmTouchError
 from shared.formation import build_formation
 from shared.nodes import dials, drone_node, endpoint
-from shared.process import StatusReporter, explain, prepare_process
+from shared.process import StatusReporter, add_process_arguments, explain, prepare_process
 from shared.topics import DRONE_STATE
 from shared.transport import Inbox
 
@@ -54,10 +54,8 @@ def _parse() -> argparse.Namespace:
         description="One drone of the swarm: computes its goal from what it hears and commands its vehicle.",
         epilog="example: python -m agents --scenario rhombus --id 2 --set vehicles.all.uri=sim://10.0.0.5:7400/{id}",
     )
-    parser.add_argument("--scenario", required=True, help="scenario file, or the name of one that ships")
+    add_process_arguments(parser)
     parser.add_argument("--id", type=int, required=True, help="number of this drone in the scenario")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
-    parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
     return parser.parse_args()
 
 

@@ -14,7 +14,7 @@ from shared.config import load_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import build_formation
 from shared.nodes import BRIDGE, dials, endpoint
-from shared.process import explain, prepare_process
+from shared.process import add_process_arguments, explain, prepare_process
 from shared.transport import Inbox
 
 _EXAMPLE = "example: python -m glove_bridge --scenario rhombus --glove terminal:// --patterns flight"
@@ -43,11 +43,9 @@ def main() -> int:
 
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m glove_bridge", description=__doc__, epilog=_EXAMPLE)
-    parser.add_argument("--scenario", required=True, help="TOML file, or the name of one that ships")
+    add_process_arguments(parser)
     parser.add_argument("--glove", default="none://", help="URI of the glove (%(default)s)")
     parser.add_argument("--patterns", default="paper", help="pattern set: name or TOML file (%(default)s)")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
-    parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
     return parser.parse_args()
 
 

@@ -13,7 +13,7 @@ from shared.config import load_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import build_formation
 from shared.nodes import RELAY, dials, endpoint
-from shared.process import explain, prepare_process
+from shared.process import add_process_arguments, explain, prepare_process
 
 _EXAMPLE = """example: python -m human_relay --scenario rhombus --hand "scripted:tour?peak=0.4"
 Orders are lines on standard input: fly, hold, land, stop (stop is final)."""
@@ -46,10 +46,8 @@ def _parse() -> argparse.Namespace:
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--scenario", required=True, help="TOML file, or the name of one that ships")
+    add_process_arguments(parser)
     parser.add_argument("--hand", default="scripted:tour", help="URI of the hand source (%(default)s)")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
-    parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
     return parser.parse_args()
 
 

@@ -1,5 +1,6 @@
 """What every process of the swarm does alike: end on signals, log, share its health, die with its launcher."""
 
+import argparse
 import ctypes
 import logging
 import os
@@ -52,6 +53,13 @@ def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
     if launcher:
         _die_with(int(launcher))
     return stopping
+
+
+def add_process_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares what every process of a swarm takes: `--scenario`, `--set` (repeatable) and `-v`."""
+    parser.add_argument("--scenario", required=True, help="TOML file, or the name of one that ships")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
+    parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
 
 
 def explain(program: str, error: SwarmTouchError) -> int:

@@ -15,7 +15,7 @@ from shared.clock import system_clock
 from shared.config import load_scenario
 from shared.errors import SwarmTouchError
 from shared.nodes import WORLD, dials, endpoint
-from shared.process import StatusReporter, explain, prepare_process
+from shared.process import StatusReporter, add_process_arguments, explain, prepare_process
 
 
 def main() -> int:
@@ -25,10 +25,8 @@ def main() -> int:
         description="The simulated world: all bodies, their links and the referee.",
         epilog="example: python -m agents.vehicles.world --scenario maze --set vehicles.all.body=crazyflie",
     )
-    parser.add_argument("--scenario", required=True, help="TOML file, or the name of one that ships")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
+    add_process_arguments(parser)
     parser.add_argument("--run-dir", type=Path, help="folder for referee.json")
-    parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
     arguments = parser.parse_args()
     stopping = prepare_process("world", verbose=arguments.verbose)
     try:
