@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from deploy.cli.arguments import add_overrides
+
 DESCRIPTION = """Measures on this machine: latency from the hand to the drones, cost of a control step, many
 agents, the simulators, the start. Real swarms and bare ones (same processes, links and payload sizes, no
 control) take turns in the same run, so that load on the machine meets both. Method: docs/performance.md."""
@@ -66,14 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _common(scenario: str) -> Declare:
     def declare(parser: argparse.ArgumentParser) -> None:
         parser.add_argument("--scenario", default=scenario, help="what flies (default: %(default)s)")
-        parser.add_argument(
-            "--set",
-            dest="overrides",
-            action="append",
-            default=[],
-            metavar="KEY=VALUE",
-            help="override a key of the scenario; repeatable",
-        )
+        add_overrides(parser)
         parser.add_argument("--json", action="store_true", help="one line of JSON per measurement on stdout")
         parser.add_argument("--plot", type=Path, metavar="FILE", help="draw it (.svg, .png; needs matplotlib)")
         parser.add_argument("--update", type=Path, metavar="FILE", help="replace its table in a Markdown file")

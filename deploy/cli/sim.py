@@ -5,6 +5,8 @@ import json
 import sys
 from pathlib import Path
 
+from deploy.cli.arguments import add_flight_arguments, seconds
+
 DESCRIPTION = """Flies a scenario in one process on a virtual clock: real agents that exchange encoded bytes,
 tick by tick, with simulated bodies. The same inputs give the same bytes. It starts from a hover in the rest
 formation. --law central lets one computer compute all drones at once (vectorised: for large formations)."""
@@ -17,24 +19,12 @@ LAWS = ("paper", "stable", "central")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the arguments."""
-    parser.add_argument("scenario", help="name of a scenario that ships, or a TOML file")
+    add_flight_arguments(parser, hand="scripted:tour?lead=1")
     parser.add_argument(
-        "--hand",
-        metavar="URI",
-        default="scripted:tour?lead=1",
-        help="hand source: scripted:NAME or recording:PATH (default: %(default)s)",
+        "--seconds", type=seconds, default=20.0, metavar="S", help="longest flight (%(default)s)"
     )
-    parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="longest flight (%(default)s)")
     parser.add_argument(
         "--law", choices=LAWS, help="another law than the scenario's, or `central`: one computer for all"
-    )
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="override a key of the scenario; repeatable",
     )
     parser.add_argument("--csv", type=Path, metavar="FILE", help="one row per tick, time-aligned")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="top view (.png, .svg, .pdf)")

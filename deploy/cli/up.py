@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from deploy.cli.arguments import add_flight_arguments, seconds
+
 DESCRIPTION = """Starts the world, one agent per drone and the hand relay as processes of their own, flies the
 scenario, lands, ends every process and prints a summary. Each run leaves runs/<stamp>/ with the resolved
 scenario, one log per process and summary.json; runs/latest points at the newest.
@@ -17,13 +19,7 @@ EXAMPLE = """swarmtouch up rhombus --seconds 30
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the arguments."""
-    parser.add_argument("scenario", help="name of a scenario that ships, or a TOML file")
-    parser.add_argument(
-        "--hand",
-        metavar="URI",
-        default="scripted:tour",
-        help="hand source: scripted:NAME or recording:PATH (default: %(default)s)",
-    )
+    add_flight_arguments(parser, hand="scripted:tour")
     parser.add_argument(
         "--glove", metavar="URI", help="make the swarm felt: terminal:// or record://FILE (default: no glove)"
     )
@@ -34,15 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="pattern set of the glove: see swarmtouch glove patterns (default: %(default)s)",
     )
     parser.add_argument(
-        "--seconds", type=_seconds, metavar="S", help="land after S seconds (default: when the hand ends)"
-    )
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="override a key of the scenario, for example formation.n=8; repeatable",
+        "--seconds", type=seconds, metavar="S", help="land after S seconds (default: when the hand ends)"
     )
     parser.add_argument(
         "--runs",
@@ -80,10 +68,3 @@ def run(arguments: argparse.Namespace) -> int:
         )
     )
     return 0 if summary["ok"] else 1
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} must be more than 0")
-    return value

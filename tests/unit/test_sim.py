@@ -50,3 +50,10 @@ def test_a_picture_in_an_unknown_format_is_refused(tmp_path: Path, capsys: pytes
     command = ["sim", "rhombus", "--hand", HAND, "--seconds", "0.2", "--plot", str(tmp_path / "flight.xyz")]
     assert main(command) == 2
     assert "flight.xyz" in capsys.readouterr().err
+
+
+def test_a_flight_of_no_length_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["sim", "rhombus", "--seconds", "-1"])
+    assert end.value.code == 2
+    assert "must be more than 0" in capsys.readouterr().err

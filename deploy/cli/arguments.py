@@ -1,0 +1,39 @@
+"""Arguments that several commands take."""
+
+import argparse
+
+
+def add_flight_arguments(parser: argparse.ArgumentParser, *, hand: str) -> None:
+    """Declares what to fly: the scenario, the hand (with its default) and `--set`."""
+    parser.add_argument("scenario", help="name of a scenario that ships, or a TOML file")
+    parser.add_argument(
+        "--hand",
+        metavar="URI",
+        default=hand,
+        help="hand source: scripted:NAME or recording:PATH (default: %(default)s)",
+    )
+    add_overrides(parser)
+
+
+def add_overrides(parser: argparse.ArgumentParser) -> None:
+    """Declares `--set KEY=VALUE`, repeatable, as `overrides`."""
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="override a key of the scenario, for example formation.n=8; repeatable",
+    )
+
+
+def seconds(text: str) -> float:
+    """Reads a duration, s.
+
+    Raises:
+        argparse.ArgumentTypeError: It is not more than 0 and finite.
+    """
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} must be more than 0")
+    return value
