@@ -1,0 +1,44 @@
+"""How an observer finds a swarm and listens to all of it; it dials every node and nobody dials it."""
+
+from pathlib import Path
+
+from shared.bus import ZenohBus
+from shared.config import load_scenario
+from shared.errors import ConfigError
+from shared.formation import build_formation
+from shared.nodes import OBSERVER, dials
+from shared.scenario import Scenario
+
+RUNS = Path("runs")
+"""Where the launcher keeps flights."""
+LATEST = "latest"
+"""Its link to the newest one."""
+SCENARIO_FILE = "scenario.toml"
+"""The resolved scenario inside a run."""
+
+
+def open_observer(scenario: Scenario) -> ZenohBus:
+    """Opens a bus that hears every node of a swarm; any number of observers may do so at once.
+
+    Args:
+        scenario: The resolved scenario: `net.endpoints` says where the nodes are.
+    """
+    return ZenohBus(scenario.swarm.name, "", dials(scenario, build_formation(scenario), OBSERVER))
+
+
+def running_scenario(source: str | None = None, runs: Path = RUNS) -> Scenario:
+    """Loads the scenario of the swarm to observe.
+
+    Args:
+        source: A run directory, a scenario file or a scenario's name; None for the newest flight in `runs`.
+        runs: Where flights are kept.
+
+    Raises:
+        ConfigError: There is no such scenario, or no flight yet.
+    """
+    if source is None:
+        source = str(runs / LATEST)
+        if not Path(source).exists():
+            raise ConfigError(f"{source}: no flight yet; start one with swarmtouch up, or name a run directory")
+    folder = Path(source)
+    return load_scenario(str(folder / SCENARIO_FILE) if folder.is_dir() else source)
