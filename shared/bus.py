@@ -1,16 +1,14 @@
 """The bus over Eclipse Zenoh; the only file that imports zenoh.
 
 Topology: peers with static links, no discovery: every node listens on its endpoint and dials the endpoints it
-is given (each pair is dialled once, by the node that comes later in `shared.nodes`). The facts behind the
-settings are measured: links found by gossip never heal after a partition, one rx worker stalls healthy peers
-when another vanishes, TCP presence is seen within milliseconds.
+is given (each pair is dialled once, by the node that comes later in `shared.nodes`); `shared.net` says how.
 """
 
 import json
 import logging
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Self
 
 # Read once when the library loads: with a single rx worker, a peer that vanishes silently stalls the others.
@@ -19,13 +17,15 @@ os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 8))")
 import zenoh
 
 from shared.errors import DeviceError
+from shared.formation import Formation
+from shared.net.settings import Settings, node_settings
+from shared.scenario import Scenario
 from shared.topics import ALIVE, Delivery, Topic
 from shared.transport import Inbox, Publish
 
 CLOSE_TIMEOUT_S = 2.0
 """Closing may hang during a partition; after this long the process ends without it."""
 
-_LEASE_MS = 1000
 _OTHERS = zenoh.Locality.REMOTE
 _log = logging.getLogger("bus")
 _QOS: dict[Delivery, dict[str, Any]] = {
@@ -45,33 +45,25 @@ _QOS: dict[Delivery, dict[str, Any]] = {
 
 
 class ZenohBus:
-    """One Zenoh session; see `shared.transport.Bus`.
+    """One process's Zenoh sessions; see `shared.transport.Bus`.
 
     Args:
-        namespace: Name of the swarm, prefix of every key.
-        listen: Own endpoint, empty to listen nowhere.
-        connect: Endpoints to dial, again and again until they answer.
-        adminspace: Whether to answer adminspace queries.
+        settings: Configuration of the session that it publishes on, see `shared.net.settings`.
+        ears: Of sessions that it only listens to, as the hand's radio.
 
     Raises:
-        DeviceError: The endpoint cannot be listened on.
+        DeviceError: An endpoint cannot be listened on.
     """
 
-    def __init__(
-        self, namespace: str, listen: str, connect: Sequence[str] = (), *, adminspace: bool = False
-    ) -> None:
-        try:
-            self._session = zenoh.open(_settings(namespace, listen, connect, adminspace))
-        except zenoh.ZError as error:
-            raise DeviceError(
-                f"cannot open the bus at {listen or 'no endpoint'}: {error}. Is the port in use? Set"
-                " net.endpoints or net.base_port"
-            ) from error
+    def __init__(self, settings: Settings, *ears: Settings) -> None:
         self._declared: list[Any] = []
+        self._sessions: list[zenoh.Session] = []
+        for each in (settings, *ears):
+            self._sessions.append(_open(each))
 
     def publisher(self, topic: Topic, **parts: object) -> Publish:
         """See `Bus.publisher`."""
-        declared = self._session.declare_publisher(topic.key(**parts), **_QOS[topic.delivery])
+        declared = self._sessions[0].declare_publisher(topic.key(**parts), **_QOS[topic.delivery])
         self._declared.append(declared)
         return declared.put
 
@@ -81,11 +73,12 @@ class ZenohBus:
         def store(sample: zenoh.Sample) -> None:
             inbox.put(str(sample.key_expr), sample.payload.to_bytes())
 
-        self._declared.append(self._session.declare_subscriber(key_expression, store, allowed_origin=_OTHERS))
+        for session in self._sessions:
+            self._declared.append(session.declare_subscriber(key_expression, store, allowed_origin=_OTHERS))
 
     def announce(self, role: str, number: int) -> None:
         """See `Bus.announce`."""
-        token = self._session.liveliness().declare_token(ALIVE.format(role=role, id=number))
+        token = self._sessions[0].liveliness().declare_token(ALIVE.format(role=role, id=number))
         self._declared.append(token)
 
     def watch_presence(self, on_change: Callable[[str, bool], None]) -> None:
@@ -95,7 +88,7 @@ class ZenohBus:
         def changed(sample: zenoh.Sample) -> None:
             on_change(str(sample.key_expr).removeprefix(prefix), sample.kind == zenoh.SampleKind.PUT)
 
-        watcher = self._session.liveliness().declare_subscriber(f"{prefix}**", changed, history=True)
+        watcher = self._sessions[0].liveliness().declare_subscriber(f"{prefix}**", changed, history=True)
         self._declared.append(watcher)
 
     def close(self) -> None:
@@ -106,7 +99,8 @@ class ZenohBus:
         for declared in self._declared:
             declared.undeclare()
         self._declared.clear()
-        self._session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        for session in self._sessions:
+            session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
         watchdog.cancel()
 
     def __enter__(self) -> Self:
@@ -116,29 +110,33 @@ class ZenohBus:
         self.close()
 
 
+def join(scenario: Scenario, formation: Formation, node: str, *, listening: bool = True) -> ZenohBus:
+    """Joins the swarm as one of its nodes.
+
+    Args:
+        scenario: The scenario; `net` says how.
+        formation: Its formation.
+        node: Name of the node (`shared.nodes`).
+        listening: False for a node that nobody dials, as any number of observers are.
+
+    Raises:
+        ConfigError: The profile wants keys that are not there.
+        DeviceError: The endpoint cannot be listened on.
+    """
+    return ZenohBus(*node_settings(scenario, formation, node, listening=listening))
+
+
+def _open(settings: Settings) -> zenoh.Session:
+    try:
+        return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
+    except zenoh.ZError as error:
+        where = ", ".join(settings["listen"]["endpoints"]) or "no endpoint"
+        raise DeviceError(
+            f"cannot open the bus at {where}: {error}. Is the port in use? Set net.endpoints or net.base_port"
+        ) from error
+
+
 def _give_up() -> None:
     _log.error("the bus did not close within %.1f s; ending without it", CLOSE_TIMEOUT_S)
     logging.shutdown()
     os._exit(1)
-
-
-def _settings(namespace: str, listen: str, connect: Sequence[str], adminspace: bool) -> zenoh.Config:
-    retry = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5}
-    tree = {
-        "mode": "peer",
-        "namespace": namespace,
-        "listen": {"endpoints": [listen] if listen else [], "exit_on_failure": True},
-        "connect": {
-            "endpoints": list(connect),
-            "timeout_ms": -1,
-            "exit_on_failure": False,
-            "retry": retry,
-        },
-        "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "adminspace": {"enabled": adminspace, "permissions": {"read": True, "write": False}},
-        "transport": {
-            "link": {"tx": {"lease": _LEASE_MS, "keep_alive": 4}},
-            "shared_memory": {"enabled": False},
-        },
-    }
-    return zenoh.Config.from_json5(json.dumps(tree))

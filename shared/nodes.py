@@ -6,7 +6,7 @@ Order matters: of two nodes that need each other the later one in `all_nodes` di
 import numpy as np
 
 from shared.formation import Formation
-from shared.scenario import Scenario
+from shared.scenario import Net, Scenario
 
 RELAY = "relay"
 WORLD = "world"
@@ -34,8 +34,13 @@ def endpoint(scenario: Scenario, formation: Formation, node: str) -> str:
 
     It is the scenario's `net.endpoints` entry, or else a port on loopback counted from `net.base_port`.
     """
-    default = f"tcp/127.0.0.1:{scenario.net.base_port + all_nodes(formation).index(node)}"
+    default = loopback(scenario.net, scenario.net.base_port + all_nodes(formation).index(node))
     return scenario.net.endpoints.get(node, default)
+
+
+def loopback(net: Net, port: int) -> str:
+    """Returns the endpoint of a port on this machine: QUIC where there are keys, else TCP."""
+    return f"quic/127.0.0.1:{port}?mixed_rel=1" if net.keys else f"tcp/127.0.0.1:{port}"
 
 
 def dials(scenario: Scenario, formation: Formation, node: str) -> list[str]:

@@ -8,6 +8,7 @@ from attrs.validators import optional
 from shared.messages import MAX_DRONE_ID
 
 Law = Literal["paper", "stable"]
+Profile = Literal["laptop", "compose", "field", "radio"]
 Shape = Literal["rhombus", "triangle", "line", "vee", "grid", "custom"]
 
 
@@ -307,13 +308,22 @@ class Net:
     """`[net]`: where the processes meet.
 
     Attributes:
+        profile: How: `laptop` (TCP on loopback), `compose` (TCP between containers), `field` (QUIC, mutual
+            TLS, access rules, signed hand) or `radio` (the hand over UDP multicast beside the mesh).
         base_port: First port on loopback of nodes without an endpoint.
         endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "tcp/10.0.0.2:7447"`.
+        keys: Directory with the keys of this node (`swarmtouch net keys`); empty: none.
+        multicast: Group of the hand's radio.
+        interface: Network interface of the radio.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
     """
 
+    profile: Profile = "laptop"
     base_port: int = field(default=7460, validator=_positive)
     endpoints: dict[str, str] = Factory(dict)
+    keys: str = ""
+    multicast: str = "udp/224.0.0.225:7450"
+    interface: str = "lo"
     adminspace: bool = False
 
 
