@@ -29,7 +29,7 @@ def main() -> int:
         settings = agent_settings(scenario, formation, args.id)
         agent = Agent(scenario, formation, args.id, settings, epoch=clock())
         vehicle = open_vehicle(str(vehicle_settings(scenario, args.id).uri))
-        bus = join(scenario, formation, drone_node(args.id))
+        bus = join(scenario, formation, drone_node(args.id), audited=True)
     except SwarmTouchError as error:
         return explain("agents", error)
     inbox = Inbox(clock, wakes_for=agent.triggers)

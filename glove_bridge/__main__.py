@@ -32,7 +32,7 @@ def main() -> int:
         bridge = Bridge(scenario, formation, patterns, cues, clock())
         with (
             closing(open_glove(arguments.glove)) as glove,
-            join(scenario, formation, BRIDGE) as bus,
+            join(scenario, formation, BRIDGE, audited=True) as bus,
         ):
             run(bridge, glove, bus, Inbox(clock), clock, stopping)
     except SwarmTouchError as error:

@@ -29,7 +29,7 @@ def main() -> int:
         scenario = load_scenario(arguments.scenario, arguments.set)
         formation = build_formation(scenario, arguments.scenario)
         with (
-            join(scenario, formation, RELAY) as bus,
+            join(scenario, formation, RELAY, audited=True) as bus,
             closing(open_source(arguments.hand, clock())) as source,
         ):
             orders = OrderReader(sys.stdin.fileno() if sys.stdin else None)

@@ -9,6 +9,7 @@ import logging
 import os
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Self
 
 # Read once when the library loads: with a single rx worker, a peer that vanishes silently stalls the others.
@@ -16,8 +17,12 @@ os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 8))")
 
 import zenoh
 
+from shared.clock import system_clock
 from shared.errors import DeviceError
 from shared.formation import Formation
+from shared.net.audit import LOG_FILTER, Audit
+from shared.net.keyring import Keyring
+from shared.net.log_tap import tap_stdout
 from shared.net.settings import Settings, node_settings
 from shared.scenario import Scenario
 from shared.topics import ALIVE, Delivery, Topic
@@ -58,8 +63,27 @@ class ZenohBus:
     def __init__(self, settings: Settings, *ears: Settings) -> None:
         self._declared: list[Any] = []
         self._sessions: list[zenoh.Session] = []
+        self._audit: Audit | None = None
         for each in (settings, *ears):
             self._sessions.append(_open(each))
+
+    def watch_links(self, audit: Audit) -> None:
+        """Tells an audit of every link of the publishing session, and of what Zenoh refuses on it.
+
+        Zenoh's log is set up once per process: call it before anybody else does.
+        """
+        self._audit = audit
+
+        def changed(event: zenoh.LinkEvent) -> None:
+            identity, name = str(event.link.zid), event.link.auth_identifier
+            audit.linked(identity, name, present=event.kind == zenoh.SampleKind.PUT)
+
+        listener = self._sessions[0].info.declare_link_events_listener(changed, history=True)
+        self._declared.append(listener)
+
+    def audit(self) -> dict[str, float]:
+        """See `Bus.audit`."""
+        return self._audit.metrics() if self._audit else {}
 
     def publisher(self, topic: Topic, **parts: object) -> Publish:
         """See `Bus.publisher`."""
@@ -110,7 +134,9 @@ class ZenohBus:
         self.close()
 
 
-def join(scenario: Scenario, formation: Formation, node: str, *, listening: bool = True) -> ZenohBus:
+def join(
+    scenario: Scenario, formation: Formation, node: str, *, listening: bool = True, audited: bool = False
+) -> ZenohBus:
     """Joins the swarm as one of its nodes.
 
     Args:
@@ -118,12 +144,33 @@ def join(scenario: Scenario, formation: Formation, node: str, *, listening: bool
         formation: Its formation.
         node: Name of the node (`shared.nodes`).
         listening: False for a node that nobody dials, as any number of observers are.
+        audited: Whether to count and log whom the access rules refuse; it takes standard output over, so it
+            is for processes that do not talk to a terminal.
 
     Raises:
         ConfigError: The profile wants keys that are not there.
         DeviceError: The endpoint cannot be listened on.
     """
-    return ZenohBus(*node_settings(scenario, formation, node, listening=listening))
+    settings = node_settings(scenario, formation, node, listening=listening)
+    if not (scenario.net.keys and audited):
+        return ZenohBus(*settings)
+    audit = Audit(Keyring(Path(scenario.net.keys)).members())
+    _listen_to_zenoh(audit)
+    bus = ZenohBus(*settings)
+    bus.watch_links(audit)
+    return bus
+
+
+def _listen_to_zenoh(audit: Audit) -> None:
+    clock = system_clock()
+
+    def on_log(text: str) -> None:
+        audit.read(text)
+        if report := audit.report(clock()):
+            _log.warning("refused: %s", report)
+
+    tap_stdout(on_log)
+    zenoh.init_log_from_env_or(LOG_FILTER)
 
 
 def _open(settings: Settings) -> zenoh.Session:

@@ -313,7 +313,8 @@ class Net:
         base_port: First port on loopback of nodes without an endpoint.
         endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "tcp/10.0.0.2:7447"`.
         keys: Directory with the keys of this node (`swarmtouch net keys`); empty: none.
-        multicast: Group of the hand's radio.
+        multicast: Group of the hand's radio, for example `udp/224.0.0.225:7450`; empty: that one, or a free
+            port of it for a flight on one machine.
         interface: Network interface of the radio.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
     """
@@ -322,7 +323,7 @@ class Net:
     base_port: int = field(default=7460, validator=_positive)
     endpoints: dict[str, str] = Factory(dict)
     keys: str = ""
-    multicast: str = "udp/224.0.0.225:7450"
+    multicast: str = ""
     interface: str = "lo"
     adminspace: bool = False
 

@@ -11,6 +11,7 @@ from attrs import frozen
 
 from shared.config import vehicle_settings
 from shared.formation import Formation
+from shared.net.settings import RADIO_GROUP
 from shared.nodes import all_nodes, loopback
 from shared.scenario import Scenario
 
@@ -124,7 +125,12 @@ def resolve_scenario(
     uri = everyone.uri or f"sim://127.0.0.1:{udp_port}/{{id}}"
     return attrs.evolve(
         scenario,
-        net=attrs.evolve(scenario.net, endpoints={**free, **scenario.net.endpoints}),
+        net=attrs.evolve(
+            scenario.net,
+            endpoints={**free, **scenario.net.endpoints},
+            # The number is free: on a radio the relay, first of all nodes, listens on no port of its own.
+            multicast=scenario.net.multicast or f"{RADIO_GROUP}:{tcp_ports[0]}",
+        ),
         vehicles=attrs.evolve(scenario.vehicles, all=attrs.evolve(everyone, uri=uri)),
     )
 

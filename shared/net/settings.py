@@ -19,6 +19,7 @@ from shared.scenario import Scenario
 Settings = dict[str, Any]
 
 LEASE_MS = 1000
+RADIO_GROUP, RADIO_PORT = "udp/224.0.0.225", 7450
 JOIN_INTERVAL_MS = 500
 """How often the radio tells newcomers how to listen: a receiver that starts late waits at most this long."""
 MAX_PUT_BYTES = 4096
@@ -52,7 +53,7 @@ def node_settings(
     mesh = peer_settings(
         scenario.swarm.name, listen, dials(scenario, formation, node), adminspace=net.adminspace
     )
-    if net.keys and (net.profile != "compose"):
+    if net.keys:
         _secure(mesh, Keyring(Path(net.keys)), scenario.swarm.name, node)
     elif net.profile == "field":
         raise ConfigError("net.keys: profile field needs keys; make them with swarmtouch net keys init")
@@ -94,7 +95,7 @@ def peer_settings(
 
 def radio_settings(scenario: Scenario) -> Settings:
     """Builds the session on the hand's multicast group: the relay speaks there, everybody else only listens."""
-    group = f"{scenario.net.multicast}#iface={scenario.net.interface}"
+    group = f"{scenario.net.multicast or f'{RADIO_GROUP}:{RADIO_PORT}'}#iface={scenario.net.interface}"
     settings = peer_settings(scenario.swarm.name, group)
     settings["transport"]["multicast"] = {"join_interval": JOIN_INTERVAL_MS}
     return settings

@@ -35,7 +35,7 @@ def main() -> int:
         setup = plan_world(scenario)
         radio = Radio(setup.address, setup.fleet.ids, setup.hovers)
         verify = hand_verifier(scenario.net)
-        bus = join(scenario, setup.formation, WORLD)
+        bus = join(scenario, setup.formation, WORLD, audited=True)
     except SwarmTouchError as error:
         return explain("world", error)
     clock = system_clock()
