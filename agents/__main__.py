@@ -35,6 +35,7 @@ def main() -> int:
             endpoint(scenario, formation, node),
             dials(scenario, formation, node),
             adminspace=scenario.net.adminspace,
+            client=scenario.net.router is not None,
         )
     except SwarmTouchError as error:
         return explain("agents", error)

@@ -33,7 +33,13 @@ def main() -> int:
         listen, connect = endpoint(scenario, formation, BRIDGE), dials(scenario, formation, BRIDGE)
         with (
             closing(open_glove(arguments.glove)) as glove,
-            ZenohBus(scenario.swarm.name, listen, connect, adminspace=scenario.net.adminspace) as bus,
+            ZenohBus(
+                scenario.swarm.name,
+                listen,
+                connect,
+                adminspace=scenario.net.adminspace,
+                client=scenario.net.router is not None,
+            ) as bus,
         ):
             run(bridge, glove, bus, Inbox(clock), clock, stopping)
     except SwarmTouchError as error:

@@ -29,7 +29,13 @@ def main() -> int:
         formation = build_formation(scenario, arguments.scenario)
         listen, connect = endpoint(scenario, formation, RELAY), dials(scenario, formation, RELAY)
         with (
-            ZenohBus(scenario.swarm.name, listen, connect, adminspace=scenario.net.adminspace) as bus,
+            ZenohBus(
+                scenario.swarm.name,
+                listen,
+                connect,
+                adminspace=scenario.net.adminspace,
+                client=scenario.net.router is not None,
+            ) as bus,
             closing(open_source(arguments.hand, clock())) as source,
         ):
             orders = OrderReader(sys.stdin.fileno() if sys.stdin else None)

@@ -23,7 +23,8 @@ def open_observer(scenario: Scenario) -> ZenohBus:
     Args:
         scenario: The resolved scenario: `net.endpoints` says where the nodes are.
     """
-    return ZenohBus(scenario.swarm.name, "", dials(scenario, build_formation(scenario), OBSERVER))
+    connect = dials(scenario, build_formation(scenario), OBSERVER)
+    return ZenohBus(scenario.swarm.name, "", connect, client=scenario.net.router is not None)
 
 
 def running_scenario(source: str | None = None, runs: Path = RUNS) -> Scenario:

@@ -10,7 +10,8 @@ import json
 import logging
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Self
 
 # Read once when the library loads: with a single rx worker, a peer that vanishes silently stalls the others.
@@ -26,6 +27,8 @@ CLOSE_TIMEOUT_S = 2.0
 """Closing may hang during a partition; after this long the process ends without it."""
 
 _LEASE_MS = 1000
+_ROUTER_TIMEOUT_MS = 3000
+_READ_ONLY = {"read": True, "write": False}
 _OTHERS = zenoh.Locality.REMOTE
 _log = logging.getLogger("bus")
 _QOS: dict[Delivery, dict[str, Any]] = {
@@ -52,21 +55,24 @@ class ZenohBus:
         listen: Own endpoint, empty to listen nowhere.
         connect: Endpoints to dial, again and again until they answer.
         adminspace: Whether to answer adminspace queries.
+        client: Whether what it dials is a router that forwards everything, instead of one peer of many.
 
     Raises:
-        DeviceError: The endpoint cannot be listened on.
+        DeviceError: The endpoint cannot be listened on, or no router answers (later it may vanish and return).
     """
 
     def __init__(
-        self, namespace: str, listen: str, connect: Sequence[str] = (), *, adminspace: bool = False
+        self,
+        namespace: str,
+        listen: str,
+        connect: Sequence[str] = (),
+        *,
+        adminspace: bool = False,
+        client: bool = False,
     ) -> None:
-        try:
-            self._session = zenoh.open(_settings(namespace, listen, connect, adminspace))
-        except zenoh.ZError as error:
-            raise DeviceError(
-                f"cannot open the bus at {listen or 'no endpoint'}: {error}. Is the port in use? Set"
-                " net.endpoints or net.base_port"
-            ) from error
+        tree = _settings("client" if client else "peer", listen, connect)
+        tree |= {"namespace": namespace, "adminspace": {"enabled": adminspace, "permissions": _READ_ONLY}}
+        self._session = _open(tree)
         self._declared: list[Any] = []
 
     def publisher(self, topic: Topic, **parts: object) -> Publish:
@@ -116,29 +122,56 @@ class ZenohBus:
         self.close()
 
 
+@contextmanager
+def routing(listen: str) -> Iterator[None]:
+    """Forwards everything between the clients that dial this endpoint, of all swarms, while it is entered.
+
+    Args:
+        listen: Endpoint of the router.
+
+    Raises:
+        DeviceError: The endpoint cannot be listened on.
+    """
+    session = _open(_settings("router", listen, ()))
+    try:
+        yield
+    finally:
+        session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+
+
+def _open(tree: dict[str, Any]) -> zenoh.Session:
+    try:
+        return zenoh.open(zenoh.Config.from_json5(json.dumps(tree)))
+    except zenoh.ZError as error:
+        if tree["mode"] == "client":
+            raise DeviceError(f"no router: {error}. Does one run where net.router says?") from error
+        where = ", ".join(tree["listen"]["endpoints"]) or "no endpoint"
+        raise DeviceError(
+            f"cannot open the bus at {where}: {error}. Is the port in use? Set net.endpoints or net.base_port"
+        ) from error
+
+
 def _give_up() -> None:
     _log.error("the bus did not close within %.1f s; ending without it", CLOSE_TIMEOUT_S)
     logging.shutdown()
     os._exit(1)
 
 
-def _settings(namespace: str, listen: str, connect: Sequence[str], adminspace: bool) -> zenoh.Config:
+def _settings(mode: str, listen: str, connect: Sequence[str]) -> dict[str, Any]:
     retry = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5}
-    tree = {
-        "mode": "peer",
-        "namespace": namespace,
+    return {
+        "mode": mode,
         "listen": {"endpoints": [listen] if listen else [], "exit_on_failure": True},
         "connect": {
             "endpoints": list(connect),
-            "timeout_ms": -1,
+            # Peers dial in the background for ever; a client can only wait, and is deaf to signals meanwhile.
+            "timeout_ms": _ROUTER_TIMEOUT_MS if mode == "client" else -1,
             "exit_on_failure": False,
             "retry": retry,
         },
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "adminspace": {"enabled": adminspace, "permissions": {"read": True, "write": False}},
         "transport": {
             "link": {"tx": {"lease": _LEASE_MS, "keep_alive": 4}},
             "shared_memory": {"enabled": False},
         },
     }
-    return zenoh.Config.from_json5(json.dumps(tree))

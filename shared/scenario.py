@@ -308,12 +308,17 @@ class Net:
 
     Attributes:
         base_port: First port on loopback of nodes without an endpoint.
+        endpoint: Endpoint of nodes without an entry in `endpoints`, `{node}` is replaced by the name of the
+            node with a dash; for example `tcp/{node}.swarm:7447`, where names resolve.
         endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "tcp/10.0.0.2:7447"`.
+        router: Endpoint of a router whose client every node is, instead of linking to each other.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
     """
 
     base_port: int = field(default=7460, validator=_positive)
+    endpoint: str | None = None
     endpoints: dict[str, str] = Factory(dict)
+    router: str | None = None
     adminspace: bool = False
 
 

@@ -35,7 +35,13 @@ def main() -> int:
         radio = Radio(setup.address, setup.fleet.ids, setup.hovers)
         listen = endpoint(scenario, setup.formation, WORLD)
         connect = dials(scenario, setup.formation, WORLD)
-        bus = ZenohBus(scenario.swarm.name, listen, connect, adminspace=scenario.net.adminspace)
+        bus = ZenohBus(
+            scenario.swarm.name,
+            listen,
+            connect,
+            adminspace=scenario.net.adminspace,
+            client=scenario.net.router is not None,
+        )
     except SwarmTouchError as error:
         return explain("world", error)
     clock = system_clock()
