@@ -8,7 +8,8 @@ import json
 import logging
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,7 +24,7 @@ from shared.formation import Formation
 from shared.net.audit import LOG_FILTER, Audit
 from shared.net.keyring import Keyring
 from shared.net.log_tap import tap_stdout
-from shared.net.settings import Settings, node_settings
+from shared.net.settings import Settings, node_settings, router_settings
 from shared.scenario import Scenario
 from shared.topics import ALIVE, Delivery, Topic
 from shared.transport import Inbox, Publish
@@ -57,7 +58,7 @@ class ZenohBus:
         ears: Of sessions that it only listens to, as the hand's radio.
 
     Raises:
-        DeviceError: An endpoint cannot be listened on.
+        DeviceError: An endpoint cannot be listened on, or no router answers (later it may vanish and return).
     """
 
     def __init__(self, settings: Settings, *ears: Settings) -> None:
@@ -173,10 +174,29 @@ def _listen_to_zenoh(audit: Audit) -> None:
     zenoh.init_log_from_env_or(LOG_FILTER)
 
 
+@contextmanager
+def routing(listen: str) -> Iterator[None]:
+    """Forwards everything between the clients that dial this endpoint, of all swarms, while it is entered.
+
+    Args:
+        listen: Endpoint of the router.
+
+    Raises:
+        DeviceError: The endpoint cannot be listened on.
+    """
+    session = _open(router_settings(listen))
+    try:
+        yield
+    finally:
+        session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+
+
 def _open(settings: Settings) -> zenoh.Session:
     try:
         return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
+        if settings["mode"] == "client":
+            raise DeviceError(f"no router: {error}. Does one run where net.router says?") from error
         where = ", ".join(settings["listen"]["endpoints"]) or "no endpoint"
         raise DeviceError(
             f"cannot open the bus at {where}: {error}. Is the port in use? Set net.endpoints or net.base_port"

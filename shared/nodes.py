@@ -30,12 +30,17 @@ def all_nodes(formation: Formation) -> tuple[str, ...]:
 
 
 def endpoint(scenario: Scenario, formation: Formation, node: str) -> str:
-    """Returns the endpoint that a node listens on.
+    """Returns the endpoint that a node listens on, empty for a client of a router.
 
-    It is the scenario's `net.endpoints` entry, or else a port on loopback counted from `net.base_port`.
+    It is the scenario's `net.endpoints` entry, or else what `net.endpoint` makes of the node's name, or else a
+    port on loopback counted from `net.base_port`.
     """
-    default = loopback(scenario.net, scenario.net.base_port + all_nodes(formation).index(node))
-    return scenario.net.endpoints.get(node, default)
+    net = scenario.net
+    if net.router is not None:
+        return ""
+    pattern = net.endpoint or ("tcp/{node}:7447" if net.profile == "compose" else None)
+    default = pattern or loopback(net, net.base_port + all_nodes(formation).index(node))
+    return net.endpoints.get(node, default.replace("{node}", node.replace("/", "-")))
 
 
 def loopback(net: Net, port: int) -> str:
@@ -45,6 +50,8 @@ def loopback(net: Net, port: int) -> str:
 
 def dials(scenario: Scenario, formation: Formation, node: str) -> list[str]:
     """Returns the endpoints that a node dials."""
+    if scenario.net.router is not None:
+        return [scenario.net.router]
     nodes = all_nodes(formation)
     earlier = nodes[: nodes.index(node)]
     return [endpoint(scenario, formation, other) for other in earlier if _linked(formation, node, other)]

@@ -17,9 +17,14 @@ from shared.errors import ConfigError, SwarmTouchError
 from shared.messages import ProcessStatus
 from shared.topics import STATUS
 from shared.transport import Bus
+from shared.watchdog import feed_watchdog
 
 LAUNCHER_PID = "SWARMTOUCH_LAUNCHER_PID"
 """Environment variable by which a launcher asks its children to die with it."""
+
+SCENARIO = "SWARMTOUCH_SCENARIO"
+OVERRIDES = "SWARMTOUCH_SET"
+"""Environment variables that stand for `--scenario` and `--set`."""
 
 EXIT_FAILED = 1
 EXIT_REFUSED = 2
@@ -56,9 +61,25 @@ def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
 
 
 def add_process_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares what every process of a swarm takes: `--scenario`, `--set` (repeatable) and `-v`."""
-    parser.add_argument("--scenario", required=True, help="TOML file, or the name of one that ships")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key")
+    """Declares what every process of a swarm takes: `--scenario`, `--set` (repeatable) and `-v`.
+
+    Containers and services say the first two in their environment; what the command line sets comes later and
+    wins.
+    """
+    scenario = os.environ.get(SCENARIO)
+    parser.add_argument(
+        "--scenario",
+        required=scenario is None,
+        default=scenario,
+        help=f"TOML file, or the name of one that ships; ${SCENARIO} if absent",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=os.environ.get(OVERRIDES, "").split(),
+        metavar="KEY=VALUE",
+        help=f"override a key; also those in ${OVERRIDES}, with spaces between",
+    )
     parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
 
 
@@ -88,7 +109,7 @@ class ResourceMeter:
 
 
 class StatusReporter:
-    """Publishes a `ProcessStatus` once a second, and whenever it is told to.
+    """Publishes a `ProcessStatus` once a second, and whenever it is told to; the watchdog hears of it, too.
 
     Args:
         bus: Where to publish.
@@ -148,6 +169,7 @@ class StatusReporter:
             metrics={**metrics(), **self._audit()},
         )
         self._publish(encode(status))
+        feed_watchdog()
         self._seq += 1
         self._last_ns, self._steps = now, steps
 

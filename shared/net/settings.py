@@ -25,6 +25,7 @@ JOIN_INTERVAL_MS = 500
 MAX_PUT_BYTES = 4096
 MAX_MESSAGE_BYTES = 65_536
 MAX_SESSIONS = 64
+ROUTER_TIMEOUT_MS = 3000
 OPEN_TIMEOUT_MS = 1500
 """Closing waits for every attempt to dial somebody who is not there: less than `bus.CLOSE_TIMEOUT_S`."""
 
@@ -49,6 +50,12 @@ def node_settings(
     net = scenario.net
     if net.profile == "radio" and node == RELAY:
         return [radio_settings(scenario)]
+    if net.router is not None:
+        if net.keys:
+            raise ConfigError(
+                "net.router: a router would speak for everybody; with net.keys nodes link directly"
+            )
+        return [client_settings(scenario.swarm.name, net.router, adminspace=net.adminspace)]
     listen = endpoint(scenario, formation, node) if listening else ""
     mesh = peer_settings(
         scenario.swarm.name, listen, dials(scenario, formation, node), adminspace=net.adminspace
@@ -74,17 +81,34 @@ def peer_settings(
         adminspace: Whether to answer adminspace queries.
     """
     return {
-        "mode": "peer",
+        **_node("peer", listen, connect),
         "namespace": namespace,
+        "adminspace": {"enabled": adminspace, "permissions": {"read": True, "write": False}},
+    }
+
+
+def client_settings(namespace: str, router: str, *, adminspace: bool = False) -> Settings:
+    """Builds the configuration of a client of one router; arguments as for `peer_settings`."""
+    return peer_settings(namespace, "", adminspace=adminspace) | _node("client", "", [router])
+
+
+def router_settings(listen: str) -> Settings:
+    """Builds the configuration of a router that forwards between its clients, of all swarms."""
+    return _node("router", listen, ())
+
+
+def _node(mode: str, listen: str, connect: Sequence[str]) -> Settings:
+    return {
+        "mode": mode,
         "listen": {"endpoints": [listen] if listen else [], "exit_on_failure": True},
         "connect": {
             "endpoints": list(connect),
-            "timeout_ms": -1,
+            # Peers dial in the background for ever; a client can only wait, and is deaf to signals meanwhile.
+            "timeout_ms": ROUTER_TIMEOUT_MS if mode == "client" else -1,
             "exit_on_failure": False,
             "retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5},
         },
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "adminspace": {"enabled": adminspace, "permissions": {"read": True, "write": False}},
         "transport": {
             "unicast": {"open_timeout": OPEN_TIMEOUT_MS, "max_sessions": MAX_SESSIONS},
             "link": {"tx": {"lease": LEASE_MS, "keep_alive": 4}},

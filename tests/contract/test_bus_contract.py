@@ -8,15 +8,16 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 import zenoh
 
 from deploy.launcher.ports import free_ports
-from shared.bus import ZenohBus
+from shared.bus import ZenohBus, routing
 from shared.errors import DeviceError
 from shared.memory_bus import MemoryBus, MemoryNetwork
-from shared.net.settings import peer_settings
+from shared.net.settings import client_settings, peer_settings
 from shared.topics import DRONE_STATE, HAND, STATUS
 from shared.transport import Bus, Inbox, Publish
 
@@ -24,12 +25,14 @@ DEADLINE_S = 20.0
 OpenBus = Callable[[], Bus]
 
 
-def memory_swarm() -> OpenBus:
+@contextmanager
+def memory_swarm() -> Iterator[OpenBus]:
     network = MemoryNetwork()
-    return lambda: MemoryBus(network)
+    yield lambda: MemoryBus(network)
 
 
-def zenoh_swarm() -> OpenBus:
+@contextmanager
+def zenoh_swarm() -> Iterator[OpenBus]:
     """Each bus listens on a port of its own and dials all that came before."""
     ports = iter(free_ports(tcp=6, udp=0)[0])
     earlier: list[str] = []
@@ -39,22 +42,30 @@ def zenoh_swarm() -> OpenBus:
         earlier.append(f"tcp/127.0.0.1:{port}")
         return bus
 
-    return open_bus
+    yield open_bus
 
 
-@pytest.fixture(params=[memory_swarm, zenoh_swarm])
+@contextmanager
+def routed_swarm() -> Iterator[OpenBus]:
+    """Each bus is client of one router."""
+    where = f"tcp/127.0.0.1:{free_ports(tcp=1, udp=0)[0][0]}"
+    with routing(where):
+        yield lambda: ZenohBus(client_settings("swarm", where))
+
+
+@pytest.fixture(params=[memory_swarm, zenoh_swarm, routed_swarm])
 def open_bus(request: pytest.FixtureRequest) -> Iterator[OpenBus]:
     """Opens further buses of one swarm; all are closed at the end."""
     opened: list[Bus] = []
-    make: OpenBus = request.param()
+    with request.param() as make:
 
-    def open_one() -> Bus:
-        opened.append(make())
-        return opened[-1]
+        def open_one() -> Bus:
+            opened.append(make())
+            return opened[-1]
 
-    yield open_one
-    for bus in opened:
-        bus.close()
+        yield open_one
+        for bus in opened:
+            bus.close()
 
 
 class Presence:
@@ -275,3 +286,17 @@ def test_an_endpoint_in_use_is_refused_with_a_hint() -> None:
         pytest.raises(DeviceError, match=rf"{port}.*Is the port in use\? Set net\.endpoints"),
     ):
         ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{port}"))
+
+
+def test_clients_outlive_their_router_and_need_one_to_begin() -> None:
+    where = f"tcp/127.0.0.1:{free_ports(tcp=1, udp=0)[0][0]}"
+    with pytest.raises(DeviceError, match=r"no router.*net\.router"):
+        ZenohBus(client_settings("swarm", where))
+    with routing(where):
+        sender, receiver = (ZenohBus(client_settings("swarm", where)) for _ in range(2))
+    with sender, receiver, routing(where):
+        inbox = inbox_of(receiver, HAND.key())
+        sender.announce("drone", 1)
+        Presence(receiver).until("drone/1")
+        sender.publisher(HAND)(b"through the new one")
+        assert collect(inbox, 1) == {HAND.key(): [b"through the new one"]}

@@ -117,3 +117,21 @@ def test_endpoints_are_counted_from_the_base_port_unless_given() -> None:
     assert endpoint(scenario, formation, "drone/2") == "tcp/10.0.0.2:7447"
     assert "tcp/10.0.0.2:7447" in dials(scenario, formation, "drone/3")
     assert len({endpoint(scenario, formation, node) for node in nodes}) == len(nodes)
+
+
+def test_a_pattern_names_every_endpoint_that_has_no_entry() -> None:
+    items = ["net.endpoint=tcp/{node}.mesh:7447", "net.endpoints.relay=tcp/relay.hand:7447"]
+    scenario = load_scenario("rhombus", items)
+    formation = build_formation(scenario)
+    assert endpoint(scenario, formation, "drone/3") == "tcp/drone-3.mesh:7447"
+    assert dials(scenario, formation, "drone/2") == ["tcp/relay.hand:7447", "tcp/drone-1.mesh:7447"]
+
+
+def test_clients_of_a_router_dial_it_alone_and_listen_nowhere() -> None:
+    scenario = load_scenario("rhombus", ["net.router=tcp/10.0.0.9:7447", "net.endpoint=tcp/{node}:7447"])
+    formation = build_formation(scenario)
+    for node in all_nodes(formation):
+        assert (endpoint(scenario, formation, node), dials(scenario, formation, node)) == (
+            "",
+            ["tcp/10.0.0.9:7447"],
+        )

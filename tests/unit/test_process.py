@@ -1,0 +1,73 @@
+"""What every process does alike: arguments from the environment, and a watchdog that hears of the loop."""
+
+import argparse
+import socket
+from pathlib import Path
+
+import pytest
+
+from shared.clock import system_clock
+from shared.memory_bus import MemoryBus, MemoryNetwork
+from shared.process import OVERRIDES, SCENARIO, StatusReporter, add_process_arguments
+from shared.watchdog import NOTIFY_SOCKET, feed_watchdog
+
+
+def parsed(*arguments: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_process_arguments(parser)
+    return parser.parse_args(arguments)
+
+
+def test_the_environment_stands_for_arguments_and_the_command_line_comes_last(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(SCENARIO, "maze")
+    monkeypatch.setenv(OVERRIDES, "  swarm.name=one\n rates.hand_hz=30 ")
+    assert parsed().scenario == "maze"
+    assert parsed("--scenario", "vee").scenario == "vee"
+    assert parsed("--set", "swarm.name=two").set == ["swarm.name=one", "rates.hand_hz=30", "swarm.name=two"]
+    assert parsed().set == ["swarm.name=one", "rates.hand_hz=30"]
+
+
+def test_without_environment_a_scenario_is_demanded(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv(SCENARIO, raising=False)
+    with pytest.raises(SystemExit):
+        parsed()
+    assert "--scenario" in capsys.readouterr().err
+
+
+@pytest.fixture
+def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> socket.socket:
+    """The socket of a service manager, and the environment that names it."""
+    listening = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    listening.bind(str(tmp_path / "notify"))
+    listening.setblocking(False)
+    monkeypatch.setenv(NOTIFY_SOCKET, str(tmp_path / "notify"))
+    return listening
+
+
+def test_every_status_feeds_the_watchdog(manager: socket.socket) -> None:
+    with manager:
+        status = StatusReporter(MemoryBus(MemoryNetwork()), "drone", 1, system_clock())
+        status.tick(0)
+        assert manager.recv(100).split() == [b"READY=1", b"WATCHDOG=1"]
+        status.tick(1)
+        with pytest.raises(BlockingIOError):
+            manager.recv(100)  # the second has not passed yet
+
+
+def test_an_abstract_socket_is_fed(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
+        listening.bind("")  # Linux chooses an abstract address
+        monkeypatch.setenv(NOTIFY_SOCKET, "@" + listening.getsockname()[1:].decode())
+        feed_watchdog()
+        assert b"WATCHDOG=1" in listening.recv(100)
+
+
+def test_a_manager_that_is_gone_or_full_stops_nobody(manager: socket.socket) -> None:
+    with manager:
+        for _ in range(10_000):
+            feed_watchdog()
+    feed_watchdog()
