@@ -54,7 +54,10 @@ def dials(scenario: Scenario, formation: Formation, node: str) -> list[str]:
         return [scenario.net.router]
     nodes = all_nodes(formation)
     earlier = nodes[: nodes.index(node)]
-    return [endpoint(scenario, formation, other) for other in earlier if _linked(formation, node, other)]
+    # On a radio the relay has no link to dial; its samples are in the air.
+    absent = {RELAY} if scenario.net.profile == "radio" else set()
+    linked = [other for other in earlier if other not in absent and _linked(formation, node, other)]
+    return [endpoint(scenario, formation, other) for other in linked]
 
 
 def neighbours(formation: Formation, drone: int) -> tuple[int, ...]:

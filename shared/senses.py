@@ -77,11 +77,11 @@ class Senses:
 
     def _take_one(self, key: str, payload: bytes, arrival_ns: int) -> None:
         if key == _HAND_KEY:
-            if self._verify:
-                self._verify(payload)
             sample = decode(payload, HandSample)
             # A signed sample that is older was recorded from the air: no silence makes it acceptable.
             _check_newer(sample, self.hand, arrival_ns, NEVER if self._verify else HAND.stale_s)
+            if self._verify:
+                self._verify(payload)
             self.hand = Sensed(sample, arrival_ns)
             return
         drone = self._ids.get(key)

@@ -22,7 +22,8 @@ LEASE_MS = 1000
 RADIO_GROUP, RADIO_PORT = "udp/224.0.0.225", 7450
 JOIN_INTERVAL_MS = 500
 """How often the radio tells newcomers how to listen: a receiver that starts late waits at most this long."""
-MAX_PUT_BYTES = 4096
+MAX_PUT_BYTES = 16_384
+"""Zenoh drops larger ones uncounted; what is over the codec's 4 KiB but under this is counted as oversized."""
 MAX_MESSAGE_BYTES = 65_536
 MAX_SESSIONS = 64
 ROUTER_TIMEOUT_MS = 3000
