@@ -131,11 +131,11 @@ def _towards(
     if not columns:
         return free, False
     if rules.rule == "projection":
-        allowed = _projected(trajectory.point, goal, settings, dt)
-        if allowed == goal:
-            return free, False
-        (x, y, z), (a, b, c) = trajectory.point, allowed
-        return ((a - x) / dt, (b - y) / dt, (c - z) / dt), True
+        (x, y, _), (a, b, _) = goal, _projected(trajectory.point, goal, settings, dt)
+        if (a - x) ** 2 + (b - y) ** 2 > 0.0:
+            x, y, z = trajectory.point
+            return ((a - x) / dt, (b - y) / dt, (goal[2] - z) / dt), True
+        return free, False
     (u, v), near = avoidance.column_velocity(trajectory.point[:2], goal[:2], columns, rules.columns, rules.xi)
     return (shorten((u, v, free[2]), rules.speed), True) if near else (free, False)
 
