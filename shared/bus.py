@@ -81,7 +81,9 @@ class ZenohBus:
         def store(sample: zenoh.Sample) -> None:
             inbox.put(str(sample.key_expr), sample.payload.to_bytes())
 
-        self._declared.append(self._session.declare_subscriber(key_expression, store, allowed_origin=_OTHERS))
+        # On Zenoh's own thread: handing over to a Python thread per subscription would cost a wake-up each.
+        handler = zenoh.handlers.Callback(store, indirect=False)
+        self._declared.append(self._session.declare_subscriber(key_expression, handler, allowed_origin=_OTHERS))
 
     def announce(self, role: str, number: int) -> None:
         """See `Bus.announce`."""
