@@ -35,7 +35,7 @@ class Agent:
     def __init__(
         self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
     ) -> None:
-        self.senses = Senses(neighbours(formation, drone))
+        self.senses = Senses(neighbours(scenario, formation, drone))
         self.steps = 0
         self._drone = drone
         self._epoch = epoch

@@ -310,11 +310,13 @@ class Net:
         base_port: First port on loopback of nodes without an endpoint.
         endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "tcp/10.0.0.2:7447"`.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
+        full_mesh: Up to this many drones everyone links to everyone; of more, only those who must.
     """
 
     base_port: int = field(default=7460, validator=_positive)
     endpoints: dict[str, str] = Factory(dict)
     adminspace: bool = False
+    full_mesh: int = field(default=16, validator=_not_negative)
 
 
 @frozen(kw_only=True)

@@ -25,7 +25,7 @@ from deploy.lockstep.record import Moment, Record, make_record
 from deploy.lockstep.start import rest_places, start_fleet
 from deploy.lockstep.ticks import tick_length
 from shared.cells import Rows, near_pairs
-from shared.formation import Formation, Vec
+from shared.formation import Formation, Link, Vec
 from shared.messages import HandSample
 from shared.scenario import Scenario
 
@@ -88,6 +88,10 @@ def _level(weights: Vec, rows: Sequence[int]) -> Level:
     return Level(np.array(rows), references, shares)
 
 
+def _parameters(link: Link) -> tuple[float, ...]:
+    return (link.mass, link.damping, link.stiffness, link.gain)
+
+
 class Batch:
     """B runs of one formation of N drones, driven tick by tick.
 
@@ -118,6 +122,10 @@ class Batch:
         self._formation = formation
         self._shape = places.shape
         self._rows = all_rows(formation)
+        distinct = {_parameters(link): link for link in formation.links}
+        self._link_kinds = tuple(distinct.values())
+        kinds = {parameters: kind for kind, parameters in enumerate(distinct)}
+        self._kind_of = np.array([kinds[_parameters(link)] for link in formation.links], dtype=np.intp)
         self._levels = [_level(formation.weights, rows) for rows in formation.levels]
         self._links = LinkState(
             displacement=np.zeros((runs, len(formation.links), 3)),
@@ -162,7 +170,7 @@ class Batch:
     def _law(self, hands: Hands, dt: float) -> tuple[Vec, Vec]:
         """Returns goals and goal velocities (B, N, 3)."""
         velocity = rotate(hands.point_velocity, -hands.yaw)
-        self._links = step_links(self._links, transition_rows(self._rows.links, dt), velocity)
+        self._links = step_links(self._links, transition_rows(self._link_kinds, dt)[self._kind_of], velocity)
         correction, rate = corrections(self._rows, self._links)
         moving = place_velocities(self._rows, correction, rate, hands.yaw, hands.yaw_rate)
         places = rotate(self._rows.offsets + correction, hands.yaw)
