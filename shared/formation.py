@@ -179,7 +179,8 @@ def _weight_row(drone: Drone, columns: Mapping[str, int], where: str) -> Vec:
 def _column(reference: str, columns: Mapping[str, int], where: str) -> int:
     """Returns the column of a reference in `[human, drones...]`."""
     if reference not in columns:
-        raise ConfigError(f'{where}: {reference!r} is neither "human" nor a drone of {list(columns)[1:]}')
+        known = [int(name) for name in columns if name != HUMAN]
+        raise ConfigError(f'{where}: {reference!r} is neither "human" nor a drone of {known}')
     return columns[reference]
 
 

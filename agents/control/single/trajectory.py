@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from agents.control.single.vectors import ORIGIN, Vector, norm, shorten
+from agents.control.single.vectors import ORIGIN, Vector, shorten
 from agents.control.trajectory import BRAKING_SHARE
 
 
@@ -40,11 +40,12 @@ def tracking_velocity(trajectory: Trajectory, goal: Vector, dt: float, accelerat
     px, py, pz = trajectory.point
     x, y, z = trajectory.goal
     gx, gy, gz = goal
-    error = (x - px, y - py, z - pz)
-    distance = norm(error)
+    ex, ey, ez = x - px, y - py, z - pz
+    distance = math.hypot(ex, ey, ez)
+    if distance == 0.0:
+        return ((gx - x) / dt, (gy - y) / dt, (gz - z) / dt)
     closing = min(distance / dt, math.sqrt(2.0 * BRAKING_SHARE * acceleration * distance))
     share = closing / max(distance, 1e-12)
-    ex, ey, ez = error
     return ((gx - x) / dt + ex * share, (gy - y) / dt + ey * share, (gz - z) / dt + ez * share)
 
 

@@ -19,16 +19,16 @@ def vector(numbers: Iterable[float]) -> Vector:
 
 def norm(vector: Vector) -> float:
     """Returns the length."""
-    x, y, z = vector
-    return math.sqrt(x * x + y * y + z * z)
+    return math.hypot(*vector)
 
 
 def shorten(vector: Vector, largest: float) -> Vector:
     """Shortens a vector to at most `largest`."""
-    share = largest / max(norm(vector), 1e-12)
-    if share >= 1.0:
-        return vector
     x, y, z = vector
+    length = math.hypot(x, y, z)
+    if length <= largest:
+        return vector
+    share = largest / length
     return (x * share, y * share, z * share)
 
 
