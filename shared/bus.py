@@ -125,7 +125,8 @@ def _give_up() -> None:
 
 
 def _settings(namespace: str, listen: str, connect: Sequence[str], adminspace: bool) -> zenoh.Config:
-    retry = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5}
+    # A swarm's processes start together and in any order: who was too early asks again soon.
+    retry = {"period_init_ms": 100, "period_max_ms": 250, "period_increase_factor": 1.5}
     tree = {
         "mode": "peer",
         "namespace": namespace,
@@ -139,8 +140,7 @@ def _settings(namespace: str, listen: str, connect: Sequence[str], adminspace: b
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "adminspace": {"enabled": adminspace, "permissions": {"read": True, "write": False}},
         "transport": {
-            **(
-            ),
+            **(),
             "link": {"tx": {"lease": _LEASE_MS, "keep_alive": 4}},
             "shared_memory": {"enabled": False},
         },
