@@ -39,7 +39,7 @@ class Inbox:
         self._wakes_for = wakes_for
         self._pending: dict[str, list[Arrival]] = {}
         self._lock = threading.Lock()
-        # Locked means that nothing is there. An Event does the same, but waits several times as long for itself.
+        # Locked: nothing is there. An Event does the same, but costs several times as much.
         self._empty = threading.Lock()
         self._empty.acquire()
         self.dropped = 0
