@@ -3,8 +3,6 @@
 import logging
 import threading
 
-from attrs import evolve
-
 from agents.agent import Agent
 from agents.vehicles.base import Pose, Vehicle
 from shared.clock import NS_PER_S, Clock
@@ -76,7 +74,7 @@ def run(
             continue
         state = agent.step(now, *seen)
         command(vehicle, state)
-        publish(encode(evolve(state, stamp_ns=clock())))
+        publish(encode(state, clock()))
         if state.mode is not mode:
             _log.info("%s at height %.2f m (%s)", state.mode, state.position[2], state.flags.name or "no flags")
             mode = state.mode

@@ -321,6 +321,7 @@ class Net:
             port of it for a flight on one machine.
         interface: Network interface of the radio.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
+        full_mesh: Up to this many drones everyone links to everyone; of more, only those who must.
     """
 
     profile: Profile = "laptop"
@@ -332,6 +333,7 @@ class Net:
     multicast: str = ""
     interface: str = "lo"
     adminspace: bool = False
+    full_mesh: int = field(default=16, validator=_not_negative)
 
 
 @frozen(kw_only=True)

@@ -107,7 +107,8 @@ def _node(mode: str, listen: str, connect: Sequence[str]) -> Settings:
             # Peers dial in the background for ever; a client can only wait, and is deaf to signals meanwhile.
             "timeout_ms": ROUTER_TIMEOUT_MS if mode == "client" else -1,
             "exit_on_failure": False,
-            "retry": {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5},
+            # A swarm's processes start together and in any order: who was too early asks again soon.
+            "retry": {"period_init_ms": 100, "period_max_ms": 250, "period_increase_factor": 1.5},
         },
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
