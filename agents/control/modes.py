@@ -80,8 +80,9 @@ def next_mode(state: ModeState, inputs: ModeInputs) -> ModeState:
         return evolve(state, mode=Mode.STOP)
     if state.must_ask_again and inputs.hand_age <= HAND_STALE and inputs.wish is not Wish.FLY:
         state = evolve(state, must_ask_again=False)
-    if state.mode in _FLYING_MODES and _must_come_down(inputs):
-        return evolve(state, mode=Mode.LAND, must_ask_again=True)
+    empty = inputs.battery <= CRITICAL_BATTERY
+    if state.mode in _FLYING_MODES and (empty or inputs.pose_age > POSE_LOST):
+        return evolve(state, mode=Mode.LAND, must_ask_again=empty or state.must_ask_again)
     return _NEXT[state.mode](state, inputs)
 
 
@@ -121,10 +122,6 @@ def _landing(state: ModeState, inputs: ModeInputs) -> ModeState:
 def _land(state: ModeState, inputs: ModeInputs) -> ModeState:
     wished = _landing_wished(inputs) and inputs.hand_age <= HAND_LAND
     return evolve(state, mode=Mode.LAND, must_ask_again=not wished)
-
-
-def _must_come_down(inputs: ModeInputs) -> bool:
-    return inputs.pose_age > POSE_LOST or inputs.battery <= CRITICAL_BATTERY
 
 
 def _landing_wished(inputs: ModeInputs) -> bool:

@@ -167,7 +167,7 @@ def test_an_old_pose_is_told_and_a_lost_one_descends_open_loop_until_the_motors_
     state, _ = repeat(state, blind, rules, 1.2 / 0.5 + 0.5)
     assert state.mode.mode is Mode.GROUND
     state, _ = repeat(state, inputs(1, position=(-0.5, 0.0, 0.0)), rules, 0.5)
-    assert state.mode.mode is Mode.GROUND  # it stays down until the operator asks again
+    assert state.mode.mode is Mode.TAKEOFF, "the operator still wants to fly, and it can see again"
 
 
 def silent_ages(seconds: list[float]) -> list[tuple[int, int]]:
