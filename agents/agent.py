@@ -5,7 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from agents.control.hand import HandInput
 from agents.control.modes import HAND_STALE
 from agents.control.single.avoidance import Encounter
-from agents.control.step import REFERENCE_LOST, Inputs, Reference, Settings, State, start, step
+from agents.control.single.repair import REFERENCE_LOST, Reference
+from agents.control.single.steering import Bystander
+from agents.control.step import Inputs, Settings, State, start, step
 from agents.stepping import due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
@@ -20,6 +22,13 @@ from shared.transport import Arrival
 
 NEVER = float("inf")
 HAND_KEY = HAND.key()
+
+SILENT_AFTER = 0.1
+"""A drone unheard for this long is kept away from more and more, s ..."""
+SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
+"""... from this distance on, growing at this rate, up to this, m and m/s."""
+FORGOTTEN_AFTER = 5.0
+"""After this long its body is no longer in the air, s."""
 
 
 class Agent:
@@ -41,6 +50,7 @@ class Agent:
         self._drone = drone
         self._epoch = epoch
         self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
+        self._kin = {kin.drone: DRONE_STATE.key(id=kin.drone) for kin in settings.kin}
         self._settings = settings
         self._rule = step_rule(scenario.rates)
         self._nominal_dt = 1.0 / scenario.rates.control_hz
@@ -131,12 +141,14 @@ class Agent:
             position=pose.position,
             velocity=pose.velocity,
             pose_age=pose_age,
+            battery=pose.battery,
             hand=None if hand is None or hand.message.position == NO_HAND else hand_input(hand.message),
             wish=None if hand is None else hand.message.mode,
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
-            references=tuple(self._reference(other, key, now_ns) for other, key in self._references.items()),
+            references=tuple(self._reference(other, key, now_ns) for other, key in self._kin.items()),
             drones=_encounters(self.senses.drones.values(), now_ns),
+            silent=_bystanders(self.senses.drones.values(), now_ns),
         )
 
     def _reference(self, other: int, key: str, now_ns: int) -> Reference | None:
@@ -154,9 +166,10 @@ class Agent:
         )
 
     def _heard(self) -> dict[str, Heard]:
-        """Returns what this step used: the hand and the references."""
+        """Returns what this step used: the hand, the references, and who stands behind one that is gone."""
         heard = {} if self.senses.hand is None else {HAND_KEY: self.senses.hand.heard}
-        for other, key in self._references.items():
+        repaired = self._state is not None and any(each.share > 0.0 for each in self._state.stand_ins)
+        for other, key in (self._kin if repaired else self._references).items():
             if other in self.senses.drones:
                 heard[key] = self.senses.drones[other].heard
         return heard
@@ -178,10 +191,24 @@ def hand_input(sample: HandSample) -> HandInput:
     )
 
 
-def _encounters(drones: Iterable[Sensed[DroneState]], now_ns: int) -> list[Encounter]:
-    """Returns where the other drones are; a silent one stays there, but no longer comes closer."""
+def _bystanders(drones: Iterable[Sensed[DroneState]], now_ns: int) -> list[Bystander]:
+    """Returns who has fallen silent: a body that may drift or fall, for as long as it may be in the air."""
     found = []
     for sensed in drones:
+        age = sensed.age(now_ns)
+        if SILENT_AFTER < age <= FORGOTTEN_AFTER:
+            x, y, _ = sensed.message.position
+            radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
+            found.append(Bystander(x, y, radius))
+    return found
+
+
+def _encounters(drones: Iterable[Sensed[DroneState]], now_ns: int) -> list[Encounter]:
+    """Returns where the other drones are; a silent one stays there for a while, but comes no closer."""
+    found = []
+    for sensed in drones:
+        if sensed.age(now_ns) > FORGOTTEN_AFTER:
+            continue
         x, y, _ = sensed.message.position
         u, v, _ = sensed.message.velocity if sensed.age(now_ns) <= DRONE_STATE.stale_s else ORIGIN
         found.append((x, y, u, v))

@@ -4,6 +4,7 @@ import logging
 import threading
 
 from agents.agent import Agent
+from agents.control.modes import POSE_LOST
 from agents.vehicles.base import Pose, Vehicle
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
@@ -87,5 +88,7 @@ def command(vehicle: Vehicle, state: DroneState) -> None:
         vehicle.stop()
     elif state.mode is Mode.GROUND:
         vehicle.idle()
+    elif state.pose_age > POSE_LOST:
+        vehicle.descend()
     else:
         vehicle.fly(state.setpoint)

@@ -4,6 +4,7 @@ import numpy as np
 
 from agents.control.hand import HandSettings
 from agents.control.single.goals import drone_row
+from agents.control.single.repair import Kin, kin_order
 from agents.control.single.steering import SteeringSettings as SingleSteeringSettings
 from agents.control.single.vectors import vector
 from agents.control.steering import SteeringSettings
@@ -24,6 +25,7 @@ def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Sett
         steering=single_steering_settings(scenario, formation, drone),
         stable=scenario.swarm.law == "stable",
         reference_heights=_reference_heights(scenario, formation, drone),
+        kin=_kin(scenario, formation, drone),
         takeoff_height=scenario.limits.takeoff_height,
         takeoff_speed=scenario.limits.takeoff_speed,
         landing_speed=scenario.limits.landing_speed,
@@ -83,6 +85,19 @@ def _reference_heights(scenario: Scenario, formation: Formation, drone: int) -> 
     if scenario.swarm.law == "stable" or scenario.formation.height_from == "references":
         return None
     return tuple(float(formation.rest[formation.row(other), 2]) for other in formation.references(drone))
+
+
+def _kin(scenario: Scenario, formation: Formation, drone: int) -> tuple[Kin, ...]:
+    order = kin_order({each: formation.references(each) for each in formation.ids}, drone)
+    return tuple(
+        Kin(
+            drone=each,
+            row=drone_row(formation, each),
+            references=tuple(order.index(other) for other in formation.references(each)),
+            heights=_reference_heights(scenario, formation, each),
+        )
+        for each in order
+    )
 
 
 def _goal_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:

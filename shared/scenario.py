@@ -237,6 +237,9 @@ class VehicleSettings:
         body: Simulated body: `identified` or `crazyflie`.
         link_loss: What a simulated body does without commands: `crazyflie` or `hover`.
         tau: Lag of the vehicle that the `stable` law leads by, s.
+        battery: Fault of a simulated vehicle: its charge at the start, 0..1.
+        endurance: The same: flying time from full to empty, s; absent: its battery never drains.
+        pose_silence: The same: (start, length) of a time without poses, s from the start of the world.
     """
 
     type: str | None = None
@@ -244,6 +247,9 @@ class VehicleSettings:
     body: Literal["identified", "crazyflie"] | None = None
     link_loss: Literal["crazyflie", "hover"] | None = None
     tau: float | None = field(default=None, validator=optional(_not_negative))
+    battery: float | None = field(default=None, validator=optional(_not_negative))
+    endurance: float | None = field(default=None, validator=optional(_positive))
+    pose_silence: tuple[float, float] | None = None
 
 
 @frozen(kw_only=True)

@@ -10,25 +10,28 @@ from agents.control import modes
 from agents.control.hand import HandInput, HandSettings, MappedHand, freeze, map_hand
 from agents.control.modes import ModeInputs, ModeState, next_mode
 from agents.control.single.avoidance import Encounter
-from agents.control.single.goals import Row, correction, place, place_velocity, weighted
+from agents.control.single.goals import Row, goal_of
 from agents.control.single.impedance import AT_REST, LinkState, step_links
-from agents.control.single.steering import SteeringSettings, Surroundings, steer
+from agents.control.single.repair import (
+    Guide,
+    Kin,
+    Reference,
+    StandIn,
+    guide_of,
+    guides,
+    nobody_gone,
+    replace_lost,
+)
+from agents.control.single.steering import Bystander, SteeringSettings, Surroundings, steer
 from agents.control.single.trajectory import Trajectory, start_at
-from agents.control.single.vectors import ORIGIN, Vector, clamp, norm, rotate
+from agents.control.single.vectors import ORIGIN, Vector, norm, rotate
 from agents.control.steering import LONGEST_STEP
-from shared.messages import MAX_POSITION, MAX_VELOCITY, NO_FLAGS, Flag, Mode, Wish
+from shared.messages import NO_FLAGS, Flag, Mode, Wish
 
-REFERENCE_LOST = 0.5
-"""A reference unheard for this long is lost, s."""
-EXTRAPOLATION = 0.25
-"""A silent reference is extrapolated by at most this, m."""
 BLOCKED_ERROR = 0.3
 """Goal error that counts as not arriving, m ..."""
 BLOCKED_TIME = 2.0
 """... after this long, s."""
-
-_FARTHEST: Vector = (MAX_POSITION, MAX_POSITION, MAX_POSITION)
-_FASTEST: Vector = (MAX_VELOCITY, MAX_VELOCITY, MAX_VELOCITY)
 
 
 @frozen(kw_only=True)
@@ -41,6 +44,7 @@ class Settings:
         steering: Limits and fields.
         stable: Whether references are the neighbours' goals instead of their positions.
         reference_heights: Rest heights of the references above the hand, m; None uses their actual ones.
+        kin: Its ancestors in the reference graph, the references of its row first and in their order.
         takeoff_height: Where it joins the formation, m.
         takeoff_speed: m/s.
         landing_speed: m/s.
@@ -51,29 +55,10 @@ class Settings:
     steering: SteeringSettings
     stable: bool
     reference_heights: tuple[float, ...] | None
+    kin: tuple[Kin, ...]
     takeoff_height: float
     takeoff_speed: float
     landing_speed: float
-
-
-class Reference(NamedTuple):
-    """A reference drone as last heard.
-
-    Attributes:
-        point: Its position (`paper`) or goal (`stable`), m.
-        velocity: The rate of that, m/s.
-        goal_velocity: Its broadcast goal velocity, m/s.
-        mode: Its mode.
-        age: Time since its sample arrived, s.
-        fresh: Whether the sample is newer than the one of the last step.
-    """
-
-    point: Vector
-    velocity: Vector
-    goal_velocity: Vector
-    mode: Mode
-    age: float
-    fresh: bool
 
 
 class Inputs(NamedTuple):
@@ -83,23 +68,27 @@ class Inputs(NamedTuple):
         position: Own body, m.
         velocity: Own body, m/s.
         pose_age: s.
+        battery: Charge, 0..1.
         hand: Newest hand sample, None before the first.
         wish: Its wish.
         hand_age: Time since it arrived, s.
         hand_fresh: Whether it is newer than the one of the last step.
-        references: One per reference of the row; None where never heard.
+        references: What is known of each of the kin; None where never heard.
         drones: Every other drone.
+        silent: Those of them that have fallen silent, where they may be by now.
     """
 
     position: Vector
     velocity: Vector
     pose_age: float
+    battery: float
     hand: HandInput | None
     wish: Wish | None
     hand_age: float
     hand_fresh: bool
     references: tuple[Reference | None, ...]
     drones: Sequence[Encounter]
+    silent: Sequence[Bystander] = ()
 
 
 class State(NamedTuple):
@@ -112,6 +101,7 @@ class State(NamedTuple):
         trajectory: Reference of the set-point.
         anchor: Own goal while no reference is usable, m.
         blocked_for: How long the drone has not arrived, s.
+        stand_ins: How far each of the kin has been replaced.
     """
 
     mode: ModeState
@@ -120,6 +110,7 @@ class State(NamedTuple):
     trajectory: Trajectory
     anchor: Vector
     blocked_for: float
+    stand_ins: tuple[StandIn, ...]
 
 
 class Output(NamedTuple):
@@ -140,6 +131,7 @@ def start(position: Vector, settings: Settings, *, airborne: bool) -> State:
         trajectory=start_at(position),
         anchor=position,
         blocked_for=0.0,
+        stand_ins=nobody_gone(settings.kin),
     )
 
 
@@ -155,14 +147,17 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
     Returns:
         The state after the step, and what to publish and to send to the vehicle.
     """
-    usable = all(r is not None and _usable(r) for r in inputs.references)
-    mode = next_mode(state.mode, _mode_inputs(inputs, settings, usable=usable))
+    stand_ins = _stand_ins(state, inputs, settings, dt)
+    lead = _lead(stand_ins, state.hand, inputs, settings)
+    usable = lead is not None
+    mode = next_mode(state.mode, _mode_inputs(state, inputs, settings, lead))
     hand = _hand(state, inputs, mode.mode, settings.hand)
     velocity = ORIGIN if hand is None else rotate(hand.velocity, -hand.yaw)
     links = step_links(state.links, settings.row.links, velocity, dt)
 
-    if mode.mode in modes.GUIDED_MODES and usable and hand is not None:
-        goal, goal_velocity = _law(inputs, hand, links, settings)
+    if mode.mode in modes.GUIDED_MODES and lead is not None and hand is not None:
+        points, velocities = [guide.point for guide in lead], [guide.velocity for guide in lead]
+        goal, goal_velocity = goal_of(settings.row, links, hand, points, velocities, settings.reference_heights)
         anchor = state.trajectory.point
     else:
         anchor = goal = _own_goal(state, mode.mode, inputs.position, settings, min(dt, LONGEST_STEP))
@@ -172,26 +167,48 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
     steered = steer(trajectory, goal, goal_velocity, _surroundings(inputs), settings.steering, dt)
     late = mode.mode is Mode.FOLLOW and math.dist(goal, inputs.position) > BLOCKED_ERROR
     blocked_for = state.blocked_for + dt if late else 0.0
-    flags = _flags(inputs, usable=usable, fenced=steered.fenced, avoiding=steered.avoiding)
+    flags = _flags(inputs, settings, usable=usable, fenced=steered.fenced, avoiding=steered.avoiding)
     if blocked_for > BLOCKED_TIME:
         flags |= Flag.BLOCKED
-    after = State(mode, hand, links, steered.trajectory, anchor, blocked_for)
+    if any(stand_in.share > 0.0 for stand_in in stand_ins[: len(settings.row.weights) - 1]):
+        flags |= Flag.REPAIRED
+    after = State(mode, hand, links, steered.trajectory, anchor, blocked_for, stand_ins)
     return after, Output(goal, goal_velocity, steered.setpoint, flags)
 
 
-def _usable(reference: Reference) -> bool:
-    return reference.age <= REFERENCE_LOST and reference.mode in modes.GUIDED_MODES
+def _stand_ins(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[StandIn, ...]:
+    """Replaces who is gone while there is a formation; on the ground everybody is expected to join."""
+    mode = state.mode.mode
+    if mode not in modes.GUIDED_MODES and mode is not Mode.TAKEOFF:
+        return nobody_gone(settings.kin)
+    velocity = ORIGIN if state.hand is None else rotate(state.hand.velocity, -state.hand.yaw)
+    return replace_lost(state.stand_ins, settings.kin, inputs.references, velocity, dt)
 
 
-def _mode_inputs(inputs: Inputs, settings: Settings, *, usable: bool) -> ModeInputs:
-    follow = usable and all(r is not None and r.mode is Mode.FOLLOW for r in inputs.references)
+def _lead(
+    stand_ins: tuple[StandIn, ...], hand: MappedHand | None, inputs: Inputs, settings: Settings
+) -> list[Guide] | None:
+    """Returns whom to follow in the place of each reference; None if one of them has not joined yet."""
+    wanted = len(settings.row.weights) - 1
+    if hand is None:
+        # Without a hand there is no goal; all that counts is whether the references hold or follow.
+        found = [guide_of(reference) for reference in inputs.references[:wanted]]
+    else:
+        found = guides(stand_ins, settings.kin, inputs.references, wanted, hand)
+    lead = [guide for guide in found if guide is not None]
+    return lead if len(lead) == wanted else None
+
+
+def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Guide] | None) -> ModeInputs:
+    lost = inputs.pose_age > modes.POSE_LOST
     return ModeInputs(
         wish=inputs.wish,
         hand_age=inputs.hand_age,
         pose_age=inputs.pose_age,
-        height=inputs.position[2],
+        battery=inputs.battery,
+        height=state.anchor[2] if lost else inputs.position[2],
         takeoff_height=settings.takeoff_height,
-        references_follow=follow,
+        references_follow=lead is not None and all(guide.follows for guide in lead),
     )
 
 
@@ -212,40 +229,6 @@ def _hand(state: State, inputs: Inputs, mode: Mode, settings: HandSettings) -> M
     return map_hand(mapped, sample, settings) if inputs.hand_fresh else mapped
 
 
-def _law(
-    inputs: Inputs, hand: MappedHand, links: tuple[LinkState, ...], settings: Settings
-) -> tuple[Vector, Vector]:
-    """Returns goal and goal velocity of this row: Eqs. 11-13, or the same on the references' goals."""
-    row = settings.row
-    heard = [r for r in inputs.references if r is not None]
-    points = [_extrapolated(r) for r in heard]
-    if settings.reference_heights is not None:
-        heights = zip(points, settings.reference_heights, strict=True)
-        points = [(x, y, hand.point[2] + height) for (x, y, _), height in heights]
-    own, rate = correction(row, links)
-    x, y, z = weighted(row, [hand.point, *points])
-    u, v, w = weighted(row, [hand.velocity, *(r.goal_velocity for r in heard)])
-    a, b, c = place(row, own, hand.yaw)
-    d, e, f = place_velocity(row, own, rate, hand.yaw, hand.yaw_rate)
-    # A goal that no receiver would accept, because a reference is at the edge of the range, helps nobody.
-    return _within((x + a, y + b, z + c), _FARTHEST), _within((u + d, v + e, w + f), _FASTEST)
-
-
-def _within(vector: Vector, largest: Vector) -> Vector:
-    x, y, z = largest
-    return clamp(vector, (-x, -y, -z), largest)
-
-
-def _extrapolated(reference: Reference) -> Vector:
-    """Returns where a silent reference would be by now, at most 0.25 m from where it was last."""
-    if reference.fresh:
-        return reference.point
-    length = norm(reference.velocity) * reference.age
-    seconds = reference.age if length <= EXTRAPOLATION else reference.age * (EXTRAPOLATION / length)
-    (x, y, z), (u, v, w) = reference.point, reference.velocity
-    return (x + u * seconds, y + v * seconds, z + w * seconds)
-
-
 def _own_goal(state: State, mode: Mode, position: Vector, settings: Settings, dt: float) -> Vector:
     """Returns the goal of a drone on its own: climbing, descending, holding, or standing on the ground."""
     x, y, z = state.anchor
@@ -262,20 +245,28 @@ def _surroundings(inputs: Inputs) -> Surroundings:
     """Returns who is around; a silent hand stays where it was, but no longer comes closer."""
     hand = inputs.hand
     if hand is None:
-        return Surroundings(inputs.position, inputs.velocity, inputs.drones, None, 0.0)
+        return Surroundings(inputs.position, inputs.velocity, inputs.drones, None, 0.0, inputs.silent)
     x, y, _ = hand.position
     u, v, _ = velocity = hand.velocity if inputs.hand_age <= modes.HAND_STALE else ORIGIN
-    return Surroundings(inputs.position, inputs.velocity, inputs.drones, (x, y, u, v), norm(velocity))
+    return Surroundings(
+        inputs.position, inputs.velocity, inputs.drones, (x, y, u, v), norm(velocity), inputs.silent
+    )
 
 
-def _flags(inputs: Inputs, *, usable: bool, fenced: bool, avoiding: bool) -> Flag:
+def _flags(inputs: Inputs, settings: Settings, *, usable: bool, fenced: bool, avoiding: bool) -> Flag:
     flags = NO_FLAGS
-    if any(r is not None and not r.fresh for r in inputs.references):
+    if any(r is not None and not r.fresh for r in inputs.references[: len(settings.row.weights) - 1]):
         flags |= Flag.EXTRAPOLATING
     if not usable:
         flags |= Flag.REFERENCE_LOST
     if inputs.hand_age > modes.HAND_STALE:
         flags |= Flag.HAND_STALE
+    if inputs.pose_age > modes.POSE_FRESH:
+        flags |= Flag.OLD_POSE
+    if inputs.battery <= modes.LOW_BATTERY:
+        flags |= Flag.LOW_BATTERY
+    if inputs.battery <= modes.CRITICAL_BATTERY:
+        flags |= Flag.CRITICAL_BATTERY
     if fenced:
         flags |= Flag.FENCE
     if avoiding:

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from agents.agent import Agent
 from agents.control.hand import HandInput
 from agents.control.single.avoidance import Encounter
+from agents.control.single.repair import EXTRAPOLATION, Reference
 from agents.control.single.vectors import vector
-from agents.control.step import EXTRAPOLATION, Inputs, Output, Reference, Settings, State, start, step
+from agents.control.step import Inputs, Output, Settings, State, start, step
 from agents.settings import agent_settings
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
@@ -60,6 +61,7 @@ def inputs(drone: int, **changes: Any) -> Inputs:
         position=REST[drone],
         velocity=ORIGIN,
         pose_age=0.0,
+        battery=1.0,
         hand=hand(),
         wish=Wish.FLY,
         hand_age=0.0,
@@ -72,7 +74,9 @@ def inputs(drone: int, **changes: Any) -> Inputs:
         }[drone],
         drones=drones(),
     )
-    return calm._replace(**changes)
+    now = calm._replace(**changes)
+    # Drone 4 knows its ancestor, drone 1, too.
+    return now._replace(references=(*now.references, reference(REST[1]))) if drone == 4 else now
 
 
 def hovering(drone: int, rules: Settings) -> State:
@@ -137,12 +141,9 @@ def test_hold_relaxes_the_links_freezes_the_hand_and_keeps_following_the_referen
     assert Flag.REFERENCE_LOST not in output.flags
 
 
-@pytest.mark.parametrize(
-    "lost",
-    [None, reference(REST[1], age=0.51, fresh=False), reference(REST[1], mode=Mode.LAND)],
-    ids=["never heard", "silent", "not in the formation"],
-)
-def test_only_without_its_references_a_drone_holds_its_own_position(lost: Reference | None) -> None:
+@pytest.mark.parametrize("mode", [Mode.GROUND, Mode.TAKEOFF])
+def test_until_its_reference_has_joined_a_drone_holds_its_own_position(mode: Mode) -> None:
+    lost = reference(REST[1], mode=mode)
     rules = settings(2)
     blown = (REST[2][0] + 0.2, *REST[2][1:])
     state, _ = step(hovering(2, rules), inputs(2, position=blown), rules, TICK)
@@ -380,6 +381,7 @@ moments = st.fixed_dictionaries(
     {
         "velocity": speeds,
         "pose_age": ages,
+        "battery": st.floats(0.0, 1.0),
         "hand": st.none()
         | st.builds(
             HandInput,
@@ -391,7 +393,7 @@ moments = st.fixed_dictionaries(
         "wish": st.sampled_from([Wish.FLY, Wish.FLY, Wish.FLY, Wish.HOLD, Wish.LAND, Wish.STOP]),
         "hand_age": ages,
         "hand_fresh": st.booleans(),
-        "references": st.tuples(references, references),
+        "references": st.tuples(references, references, references),
         "drones": st.lists(places, max_size=3).map(lambda found: drones(*found)),
     }
 )

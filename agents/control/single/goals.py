@@ -5,9 +5,14 @@ from collections.abc import Sequence
 
 from attrs import frozen
 
+from agents.control.hand import MappedHand
 from agents.control.single.impedance import LinkState
-from agents.control.single.vectors import Vector, rotate, vector
+from agents.control.single.vectors import Vector, clamp, rotate, vector
 from shared.formation import Formation, Link
+from shared.messages import MAX_POSITION, MAX_VELOCITY
+
+_FARTHEST: Vector = (MAX_POSITION, MAX_POSITION, MAX_POSITION)
+_FASTEST: Vector = (MAX_VELOCITY, MAX_VELOCITY, MAX_VELOCITY)
 
 
 @frozen(kw_only=True)
@@ -70,6 +75,40 @@ def weighted(row: Row, vectors: Sequence[Vector]) -> Vector:
     for weight, (a, b, c) in zip(row.weights, vectors, strict=True):
         x, y, z = x + weight * a, y + weight * b, z + weight * c
     return (x, y, z)
+
+
+def goal_of(
+    row: Row,
+    links: Sequence[LinkState],
+    hand: MappedHand,
+    points: Sequence[Vector],
+    velocities: Sequence[Vector],
+    heights: Sequence[float] | None,
+) -> tuple[Vector, Vector]:
+    """Returns goal and goal velocity of one row: Eqs. 11-13, or the same on the references' goals.
+
+    Args:
+        row: The row.
+        links: State of its links.
+        hand: The mapped hand.
+        points: Of its references, m.
+        velocities: Their goal velocities, m/s.
+        heights: Rest heights of the references above the hand, m; None uses those of their points.
+    """
+    if heights is not None:
+        points = [(x, y, hand.point[2] + height) for (x, y, _), height in zip(points, heights, strict=True)]
+    own, rate = correction(row, links)
+    x, y, z = weighted(row, [hand.point, *points])
+    u, v, w = weighted(row, [hand.velocity, *velocities])
+    a, b, c = place(row, own, hand.yaw)
+    d, e, f = place_velocity(row, own, rate, hand.yaw, hand.yaw_rate)
+    # A goal that no receiver would accept, because a reference is at the edge of the range, helps nobody.
+    return _within((x + a, y + b, z + c), _FARTHEST), _within((u + d, v + e, w + f), _FASTEST)
+
+
+def _within(vector: Vector, largest: Vector) -> Vector:
+    x, y, z = largest
+    return clamp(vector, (-x, -y, -z), largest)
 
 
 def place(row: Row, correction: Vector, yaw: float) -> Vector:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from agents.control.avoidance import COLUMN_BUBBLE, DRONE_BUBBLE, HAND_BUBBLE
 from agents.control.projection import project_swept
@@ -42,6 +42,20 @@ class SteeringSettings:
     lead_above: float
 
 
+class Bystander(NamedTuple):
+    """A body that nobody hears: it may be anywhere near, at any height.
+
+    Attributes:
+        x: Where it was last, m.
+        y: The same.
+        radius: How far to stay away, m.
+    """
+
+    x: float
+    y: float
+    radius: float
+
+
 class Surroundings(NamedTuple):
     """The body that is steered, and who is around.
 
@@ -51,6 +65,7 @@ class Surroundings(NamedTuple):
         drones: Every other drone.
         hand: The real hand; None before the first sample.
         hand_speed: m/s.
+        silent: Drones that have fallen silent, also among `drones`.
     """
 
     position: Vector
@@ -58,6 +73,7 @@ class Surroundings(NamedTuple):
     drones: Sequence[Encounter]
     hand: Encounter | None
     hand_speed: float
+    silent: Sequence[Bystander] = ()
 
 
 class Steered(NamedTuple):
@@ -165,6 +181,9 @@ def _keep_off(
     body, flying = around.position[:2], around.velocity[:2]
     field = settings.avoidance.separation
     pressing = [avoidance.threats(body, flying, around.drones, DRONE_BUBBLE)]
+    for x, y, radius in around.silent:
+        wider = evolve(DRONE_BUBBLE, radius=radius)
+        pressing.append(avoidance.threats(body, flying, [(x, y, 0.0, 0.0)], wider))
     u, v = avoidance.separation(point, around.drones, field)
     if around.hand is not None:
         hand = (around.hand,)
