@@ -47,7 +47,6 @@ class Status(enum.IntEnum):
 
 
 _U8, _U16 = and_(ge(0), le(0xFF)), and_(ge(0), le(0xFFFF))
-_FIVE = and_(min_len(MOTORS), max_len(MOTORS))
 
 
 @frozen
@@ -92,7 +91,7 @@ class Set:
     TYPE: ClassVar = 0x02
 
     seq: int = field(validator=_U8)
-    duties: tuple[int, ...] = field(validator=deep_iterable(_U8, _FIVE))
+    duties: tuple[int, ...] = field(validator=[deep_iterable(_U8), min_len(MOTORS), max_len(MOTORS)])
 
     def body(self) -> bytes:
         """Returns the bytes after type and seq."""
@@ -114,7 +113,7 @@ class PlayFrame:
     """
 
     ms: int = field(validator=and_(ge(1), le(MAX_PATTERN_MS)))
-    duties: tuple[int, ...] = field(validator=deep_iterable(_U8, _FIVE))
+    duties: tuple[int, ...] = field(validator=[deep_iterable(_U8), min_len(MOTORS), max_len(MOTORS)])
 
 
 @frozen
