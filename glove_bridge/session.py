@@ -113,6 +113,11 @@ class Session:
         self._ping_ns = 0
         self._reports: list[Report] = []
 
+    @property
+    def quiet(self) -> bool:
+        """Whether no command waits for its answer; without a session none ever does."""
+        return self.device is None or self._asked is None
+
     def opened(self, now_ns: int) -> None:
         """Notes that the port is open: says HELLO."""
         self._decoder = StreamDecoder()

@@ -33,8 +33,8 @@ def flight_summary(outcome: Outcome, monitor: Monitor, glove: GloveChoice | None
         `fence_exits` (null without a simulated world), `agents` with `id, steps, rate_hz, on_time, hand_used,
         tracking_rms_m, latency_ms {p50, p99}, cpu, rss_mb` each; and beyond the contract `landed`,
         `formation`, `glove` (null without one: `uri`, `patterns`; `played`, `delivered`, `suppressed`, `failed`
-        and `lost` by pattern; `latency_ms` from the drone state to the first frame) and, per agent, `lateness_ms`,
-        `missed` and `restarts`.
+        and `lost` by pattern; `latency_ms` from the drone state to the first frame) and, per agent,
+        `lateness_ms`, `missed` and `restarts`.
     """
     referee = outcome.referee
     formation = attrs.asdict(monitor.stats.formation())

@@ -112,16 +112,16 @@ class SerialLink:
         self.session.opened(time.monotonic_ns())
 
     def _serve(self) -> None:
-        """Receive -> step -> write, until told to close or the port fails."""
+        """Orders -> write -> receive, until the port fails, or told to close and the STOP is answered."""
         port = self._port
         while port is not None:
-            closing = self._closing.is_set()
+            closing = self._closing.is_set()  # looked at first: `close` gives its order before
             self._obey()
             line = self.session.due(time.monotonic_ns())
             if line:
                 port.write(line)
             self._tell()
-            if closing:
+            if closing and self.session.quiet:
                 return
             heard = port.read(max(1, port.in_waiting))
             self.session.receive(heard, time.monotonic_ns())
