@@ -235,7 +235,7 @@ def test_flash_calls_avrdude_for_an_uno(
 def test_flash_without_firmware_says_how_to_build_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(flash, "BUILT", tmp_path / "glove.hex")
+    monkeypatch.setattr(flash, "BUILT", (tmp_path / "glove.hex",))
     assert main(["glove", "flash", "--port", "/dev/ttyACM0"]) == 2
     assert f"make -C {flash.FIRMWARE}" in capsys.readouterr().err
     assert (flash.FIRMWARE / "glove" / "glove.ino").is_file()
