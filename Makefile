@@ -36,6 +36,7 @@ lint: $(DEVELOPMENT)
 chip:  ## the glove's firmware, its fuzzer, and a simulated chip that runs it, with Debian's packages
 	$(MAKE) -C glove_bridge/firmware BUILD=$(CURDIR)/build/firmware
 	$(MAKE) -C tests/chip/harness BUILD=$(CURDIR)/build/chip
+	$(MAKE) -C tests/chip/fuzz BUILD=$(CURDIR)/build/fuzz
 
 clean:  ## remove what was set up and cached; flights in runs/ stay
 	rm -rf .bootstrap .venv build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

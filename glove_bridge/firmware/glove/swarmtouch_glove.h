@@ -7,7 +7,6 @@
 #pragma once
 
 #include <stdint.h>
-#include <string.h>
 
 namespace swarmtouch {
 
@@ -65,7 +64,7 @@ constexpr uint16_t kCrcStart = 0xFFFF;
 // Finds packets in a stream of bytes. Decodes as they come: after the last byte little is left to do.
 class Receiver {
  public:
-  // Takes a byte. Returns whether it ended a whole packet, which is there until the next byte.
+  // Takes a byte. Returns whether it ended a whole packet, which is there until the next byte, or kept.
   bool feed(uint8_t byte) {
     if (finished_) start();
     if (byte == 0) return finish();
@@ -81,16 +80,23 @@ class Receiver {
     return false;
   }
 
-  uint8_t type() const { return packet_[0]; }
-  uint8_t seq() const { return packet_[1]; }
-  const uint8_t* body() const { return packet_ + kHead; }
+  // Keeps the packet where it is until another one is kept: what plays need not be copied.
+  void keep() { keep_ = true; }
+
+  uint8_t type() const { return packet()[0]; }
+  uint8_t seq() const { return packet()[1]; }
+  const uint8_t* body() const { return packet() + kHead; }
   uint8_t bodySize() const { return static_cast<uint8_t>(size_ - kHead - kCrc); }
   uint16_t rejected() const { return rejected_; }
 
  private:
   static constexpr uint8_t kNoZero = 0xFF;  // the COBS code after which no zero is implied
 
+  const uint8_t* packet() const { return packets_[current_]; }
+
   void start() {
+    if (keep_) current_ ^= 1;
+    keep_ = false;
     size_ = left_ = 0;
     code_ = kNoZero;
     crc_ = kCrcStart;
@@ -101,7 +107,7 @@ class Receiver {
   void append(uint8_t byte) {
     overflow_ = overflow_ || size_ == kMaxPacket;
     if (overflow_) return;
-    packet_[size_++] = byte;
+    packets_[current_][size_++] = byte;
     crc_ = crcStep(crc_, byte);
   }
 
@@ -112,7 +118,8 @@ class Receiver {
     return whole;
   }
 
-  uint8_t packet_[kMaxPacket];
+  uint8_t packets_[2][kMaxPacket];
+  uint8_t current_ = 0;
   uint8_t size_ = 0;
   uint8_t left_ = 0;  // until the next COBS code
   uint8_t code_ = kNoZero;
@@ -121,6 +128,7 @@ class Receiver {
   bool empty_ = true;
   bool overflow_ = false;
   bool finished_ = false;
+  bool keep_ = false;
 };
 
 // Builds a reply and puts it on the line.
@@ -171,55 +179,49 @@ class Reply {
 // Plays a pattern frame by frame, or holds duties. Each frame starts where the one before ended: nothing drifts.
 class Player {
  public:
-  // Takes `count` frames as they are on the line; false if one is empty or all are too long.
+  // Takes `count` frames as they are on the line, where they must stay; false if one is empty or all are too long.
   bool play(const uint8_t* frames, uint8_t count, uint32_t nowUs) {
-    uint16_t total = 0;
-    for (uint8_t i = 0; i < count; ++i) {
-      const uint16_t ms = read16(frames + i * kFrameSize);
-      if (ms == 0 || ms > kMaxPatternMs - total) return false;
-      total = static_cast<uint16_t>(total + ms);
+    uint16_t totalMs = 0;
+    for (const uint8_t* frame = frames; frame != frames + count * kFrameSize; frame += kFrameSize) {
+      const uint16_t ms = read16(frame);
+      if (ms == 0 || ms > kMaxPatternMs - totalMs) return false;
+      totalMs = static_cast<uint16_t>(totalMs + ms);
     }
-    memcpy(frames_, frames, static_cast<uint16_t>(count * kFrameSize));
-    state_ = kPlaying;
-    frame_ = 0;
-    count_ = count;
-    totalMs_ = total;
+    duties_ = frames + 2;
+    left_ = count;
+    totalMs_ = totalMs;
     startUs_ = frameUs_ = nowUs;
     return true;
   }
 
+  // Takes five duties, which must stay where they are.
   void hold(const uint8_t* duties) {
-    memcpy(frames_ + 2, duties, kMotors);
-    frame_ = 0;
-    state_ = kHolding;
+    duties_ = duties;
+    left_ = 0;
   }
 
-  void stop() { state_ = kResting; }
+  void stop() { duties_ = nullptr; }
 
   void tick(uint32_t nowUs) {
-    while (state_ == kPlaying && nowUs - frameUs_ >= lengthUs()) {
+    while (playing() && nowUs - frameUs_ >= lengthUs()) {
       frameUs_ += lengthUs();
-      if (++frame_ == count_) state_ = kResting;
+      duties_ = --left_ > 0 ? duties_ + kFrameSize : nullptr;
     }
   }
 
-  uint8_t duty(uint8_t motor) const { return state_ == kResting ? 0 : frames_[frame_ * kFrameSize + 2 + motor]; }
+  uint8_t duty(uint8_t motor) const { return duties_ != nullptr ? duties_[motor] : 0; }
 
   uint16_t remainingMs(uint32_t nowUs) const {
-    if (state_ == kHolding) return kHeld;
-    if (state_ == kResting) return 0;
+    if (!playing()) return duties_ != nullptr ? kHeld : 0;
     return static_cast<uint16_t>(totalMs_ - (nowUs - startUs_) / 1000);
   }
 
  private:
-  enum State : uint8_t { kResting, kPlaying, kHolding };
+  bool playing() const { return duties_ != nullptr && left_ > 0; }
+  uint32_t lengthUs() const { return 1000UL * read16(duties_ - 2); }
 
-  uint32_t lengthUs() const { return 1000UL * read16(frames_ + frame_ * kFrameSize); }
-
-  uint8_t frames_[kFrameSize * kMaxFrames];
-  State state_ = kResting;
-  uint8_t frame_ = 0;
-  uint8_t count_ = 0;
+  const uint8_t* duties_ = nullptr;  // of the frame that plays, or held; none: the motors rest
+  uint8_t left_ = 0;                 // frames, with the one that plays; 0 when held
   uint16_t totalMs_ = 0;
   uint32_t startUs_ = 0;
   uint32_t frameUs_ = 0;  // when the frame started
@@ -295,10 +297,13 @@ class Glove {
       case kSet:
         if (size != kMotors) return kBadBody;
         player_.hold(body);
+        receiver_.keep();
         return kOk;
       case kPlay:
         if (size == 0 || size % kFrameSize != 0) return kBadBody;
-        return player_.play(body, size / kFrameSize, nowUs) ? kOk : kBadBody;
+        if (!player_.play(body, size / kFrameSize, nowUs)) return kBadBody;
+        receiver_.keep();
+        return kOk;
       case kStop:
         if (size != 0) return kBadBody;
         player_.stop();

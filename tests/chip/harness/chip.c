@@ -20,7 +20,7 @@ enum {
   TCCR2A = 0xB0, OCR2B = 0xB4,
   UCSR0A = 0xC0, UBRR0L = 0xC4, UBRR0H = 0xC5,
 };
-enum { COMA1 = 1 << 7, COMB1 = 1 << 5, U2X0 = 1 << 1, JUMPER = 1 << 7 };
+enum { COMA1 = 1 << 7, COMB1 = 1 << 5, U2X0 = 1 << 1, JUMPER = 7 };
 
 // analogWrite() connects the pin before it sets the duty: shorter than this it is not meant, 20 us.
 enum { GLITCH = 320, LONGEST_QUEUE = 256, SPIN = 0x7FFE };
@@ -128,12 +128,18 @@ static void watch(uint16_t address) {
   avr_irq_register_notify(avr_iomem_getirq(avr, address, NULL, AVR_IOMEM_IRQ_ALL), register_written, NULL);
 }
 
+// An unfiltered pin tells its level even if it had the same before a reset, which simavr does not notice.
+static avr_irq_t *pin_of(char port, int bit) {
+  avr_irq_t *pin = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(port), bit);
+  pin->flags &= ~IRQ_FLAG_FILTERED;
+  return pin;
+}
+
 static void watch_motors(void) {
   const uint16_t registers[] = {DDRB, PORTB, DDRD, PORTD, TCCR0A, OCR0A, OCR0B, TCCR1A, OCR1AL, OCR1BL, TCCR2A, OCR2B};
   for (unsigned k = 0; k < sizeof registers / sizeof *registers; ++k) watch(registers[k]);
   for (int k = 0; k < MOTORS; ++k) {
-    avr_irq_t *pin = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(kPins[k].port), kPins[k].bit);
-    avr_irq_register_notify(pin, pin_changed, &motors[k]);
+    avr_irq_register_notify(pin_of(kPins[k].port, kPins[k].bit), pin_changed, &motors[k]);
   }
 }
 
@@ -156,6 +162,12 @@ static void reset(void) {
   look_at_motors();
 }
 
+static void set_jumper(bool closed) {
+  avr_ioport_external_t pull = {.name = 'D', .mask = 1 << JUMPER, .value = !closed << JUMPER};
+  avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL('D'), &pull);
+  pin_of('D', JUMPER);
+}
+
 bool chip_start(const char *firmware, bool xbee, chip_said_t said, chip_drove_t drove) {
   static elf_firmware_t program;
   if (elf_read_firmware(firmware, &program) != 0) return false;
@@ -171,8 +183,7 @@ bool chip_start(const char *firmware, bool xbee, chip_said_t said, chip_drove_t 
   avr->flash[SPIN + 1] = 0xCF;
   on_said = said;
   on_drove = drove;
-  avr_ioport_external_t jumper = {.name = 'D', .mask = JUMPER, .value = xbee ? 0 : JUMPER};
-  avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL('D'), &jumper);
+  set_jumper(xbee);
   find_uart();
   watch_motors();
   reset();
