@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--turn", type=seconds, default=1.0, metavar="S", help="length of a trial, s (default: %(default)s)"
     )
     flash.add_argument("--port", metavar="DEVICE", help="default: the only USB port")
-    flash.add_argument("--hex", type=Path, metavar="FILE", help="default: what `make chip` has built")
+    flash.add_argument("--hex", type=Path, metavar="FILE", help="default: the firmware that ships")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -10,8 +10,8 @@ from deploy.glove.device import only_port
 from shared.errors import ConfigError, DeviceError
 
 FIRMWARE = Path(glove_bridge.__file__).parent / "firmware"
-BUILT = (FIRMWARE.parents[1] / "build" / "firmware" / "glove.hex", FIRMWARE / "build" / "glove.hex")
-"""Where `make chip` and `make -C glove_bridge/firmware` leave it."""
+IMAGE = FIRMWARE / "glove.hex"
+"""Built from the sketch beside it."""
 _UNO = ("-p", "atmega328p", "-c", "arduino", "-b", "115200", "-D")
 
 
@@ -22,12 +22,9 @@ def run(arguments: argparse.Namespace) -> int:
         ConfigError: No firmware, no avrdude, or no telling which port.
         DeviceError: avrdude failed; what it says is on the terminal.
     """
-    image: Path = arguments.hex or next((path for path in BUILT if path.is_file()), BUILT[-1])
+    image: Path = arguments.hex or IMAGE
     if not image.is_file():
-        raise ConfigError(
-            f"{image}: no firmware; build it (Debian: gcc-avr, avr-libc, arduino-core-avr) with"
-            f" `make -C {FIRMWARE}`, or open {FIRMWARE / 'glove'} in the Arduino IDE"
-        )
+        raise ConfigError(f"{image}: there is no such file; `make -C {FIRMWARE}` builds {IMAGE.name}")
     avrdude = shutil.which("avrdude")
     if avrdude is None:
         raise ConfigError("avrdude is missing; on Debian: apt install avrdude")

@@ -232,10 +232,17 @@ def test_flash_calls_avrdude_for_an_uno(
     assert "avrdude ended with 3" in capsys.readouterr().err
 
 
+def test_flash_takes_the_firmware_that_ships(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    fake_avrdude(tmp_path, 0)
+    assert main(["glove", "flash", "--port", "/dev/ttyACM0"]) == 0
+    assert (tmp_path / "called").read_text().endswith(f"flash:w:{flash.IMAGE}:i\n")
+    assert flash.IMAGE.read_text().endswith(":00000001FF\n")
+
+
 def test_flash_without_firmware_says_how_to_build_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(flash, "BUILT", (tmp_path / "glove.hex",))
-    assert main(["glove", "flash", "--port", "/dev/ttyACM0"]) == 2
+    assert main(["glove", "flash", "--port", "/dev/ttyACM0", "--hex", str(tmp_path / "none.hex")]) == 2
     assert f"make -C {flash.FIRMWARE}" in capsys.readouterr().err
     assert (flash.FIRMWARE / "glove" / "glove.ino").is_file()
