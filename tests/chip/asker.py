@@ -10,7 +10,8 @@ import serial
 from glove_bridge.framing import StreamDecoder, encode
 from glove_bridge.protocol import USB_BAUD, USB_DEADMAN_MS, Ack, Command, Hello, HelloReply, Reply
 
-PATIENCE_S = 1.0
+PATIENCE_S = 0.5
+ATTEMPTS = 3
 
 
 class Asker:
@@ -40,10 +41,12 @@ class Asker:
         return reply
 
     def tell(self, command: Command) -> Ack:
-        """Asks for something that is acknowledged."""
-        reply = self.ask(command)
-        assert isinstance(reply, Ack)
-        return reply
+        """Asks for something that is acknowledged, again if need be: a chip that starts hears nothing."""
+        for _ in range(ATTEMPTS):
+            reply = self.ask(command)
+            if isinstance(reply, Ack):
+                return reply
+        raise AssertionError(f"no answer to {command}")
 
     def ask(self, command: Command) -> Reply | None:
         """Sends a command once and returns its answer, None if none comes in time."""
@@ -58,8 +61,3 @@ class Asker:
     def send(self, line: bytes) -> None:
         """Writes bytes."""
         self._port.write(line)
-
-    def deaf(self) -> bool:
-        """Returns whether nothing whatever comes from the chip for a while."""
-        until = time.monotonic() + PATIENCE_S / 2
-        return not any(self._port.read(64) for _ in iter(lambda: time.monotonic() < until, False))
