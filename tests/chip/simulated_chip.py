@@ -1,7 +1,7 @@
 """The firmware on a simulated ATmega328P behind a pseudo-terminal, and what its motors did.
 
-Times are the chip's own, in ms of simulated time since its start; the simulation keeps pace with the wall clock
-and says so nowhere: judge timing by the chip's time only.
+Times are the chip's own, ms of simulated time since its start. It keeps pace with the wall clock as well as the
+machine allows: timing is judged by the chip's time only.
 """
 
 import json
