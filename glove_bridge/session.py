@@ -96,6 +96,7 @@ class Session:
 
     Attributes:
         device: What has answered, None while there is no session.
+        answers: How many commands were answered.
         retries: Commands that were sent again.
         round_trip_ns: From the last command that was answered at once to its answer; None before.
         fault: Why there is no session, for people; empty while there is one.
@@ -103,7 +104,7 @@ class Session:
 
     def __init__(self, timing: LinkTiming, nonce: int) -> None:
         self.device: HelloReply | None = None
-        self.retries = 0
+        self.answers = self.retries = 0
         self.round_trip_ns: int | None = None
         self.fault = "not open"
         self._timing, self._nonce, self._seq = timing, nonce, 0
@@ -217,6 +218,7 @@ class Session:
             self._greet("the device was reset", now_ns)
             return
         self._asked = None
+        self.answers += 1
         if asked.sent == 1:
             self.round_trip_ns = now_ns - asked.sent_ns
         self._keep_alive(now_ns)

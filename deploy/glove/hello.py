@@ -37,11 +37,10 @@ def run(arguments: argparse.Namespace) -> int:
 def _round_trips_ms(glove: SerialGlove) -> list[float]:
     """Waits for some of the PINGs that keep the session alive."""
     rounds: list[float] = []
-    session = glove.link.session
-    deadline = time.monotonic() + _ROUNDS
-    while len(rounds) < _ROUNDS and glove.connected and time.monotonic() < deadline:
-        newest = session.round_trip_ns
-        if newest is not None and newest / 1e6 not in rounds:
-            rounds.append(newest / 1e6)
+    session, seen = glove.link.session, 0
+    while len(rounds) < _ROUNDS and glove.connected:
+        if session.answers > seen and session.round_trip_ns is not None:
+            seen = session.answers
+            rounds.append(session.round_trip_ns / 1e6)
         time.sleep(0.01)
     return rounds

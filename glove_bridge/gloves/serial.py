@@ -16,6 +16,7 @@ from glove_bridge.session import USB, XBEE, LinkTiming, Session
 from shared.errors import ConfigError
 from shared.uri import Uri
 
+_RATES = (9600, 19200, 38400, 57600, 115200)
 _LINKS = {"usb": USB, "xbee": XBEE}
 _POLL_NS = 2_000_000
 """How soon to poll again while the device has something to say."""
@@ -89,7 +90,10 @@ class SerialGlove:
             self.link.close()
 
     def _note(self, now_ns: int) -> int:
-        """Learns the offset between the caller's clock and the line's; of both, the newest look is the best."""
+        """Learns how far the caller's clock is ahead of the line's.
+
+        A caller looks at its clock before it calls, never after: the largest offset is the nearest.
+        """
         offset = now_ns - time.monotonic_ns()
         self._offset_ns = offset if self._offset_ns is None else max(self._offset_ns, offset)
         self._polled_ns = now_ns
@@ -100,10 +104,14 @@ def link_timing(uri: Uri) -> LinkTiming:
     """Reads the options `link` and `baud`.
 
     Raises:
-        ConfigError: Another link than `usb` or `xbee`, or a rate that no line has.
+        ConfigError: Another link than `usb` or `xbee`, or a rate that not every port has.
     """
     name = uri.options.get("link", "usb")
     if name not in _LINKS:
         raise ConfigError(f"{uri.text}: link={name}; known ones: {', '.join(_LINKS)}")
     timing = _LINKS[name]
-    return attrs.evolve(timing, baud=int(uri.number("baud", timing.baud, low=9600, high=1_000_000)))
+    rates = {str(rate): rate for rate in _RATES}
+    baud = uri.options.get("baud", str(timing.baud))
+    if baud not in rates:
+        raise ConfigError(f"{uri.text}: baud={baud}; known ones: {', '.join(rates)}")
+    return attrs.evolve(timing, baud=rates[baud])

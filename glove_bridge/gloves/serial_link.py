@@ -105,7 +105,7 @@ class SerialLink:
             self._device, self._timing.baud, timeout=TICK_S, write_timeout=WRITE_S, exclusive=True
         )
         # Only some adapters can: without it an FTDI chip keeps every answer back for up to 16 ms.
-        with suppress(ValueError, AttributeError):
+        with suppress(ValueError, AttributeError, NotImplementedError):
             port.set_low_latency_mode(True)
         with self._port_lock:
             self._port = port
