@@ -79,14 +79,6 @@ class _Asked:
     due_ns: int = 0
 
 
-@define
-class _Playing:
-    """What is on the glove: its length, and when it should end; 0 until the device has it."""
-
-    length_ms: int
-    end_ns: int = 0
-
-
 class Session:
     """The host's side of one line, from one opening of the port to the next.
 
@@ -110,7 +102,7 @@ class Session:
         self._timing, self._nonce, self._seq = timing, nonce, 0
         self._decoder = StreamDecoder()
         self._asked: _Asked | None = None
-        self._playing: _Playing | None = None
+        self._playing_ms: int | None = None
         self._ping_ns = 0
         self._reports: list[Report] = []
 
@@ -136,7 +128,7 @@ class Session:
             self._reports.append(Report(Outcome.FAILED, now_ns))
             return
         command = Play(self._next_seq(), tuple(frames))
-        self._playing = _Playing(command.length_ms)
+        self._playing_ms = command.length_ms
         self._ask(command, now_ns)
 
     def hold(self, duties: Sequence[int], now_ns: int) -> None:
@@ -222,23 +214,22 @@ class Session:
         if asked.sent == 1:
             self.round_trip_ns = now_ns - asked.sent_ns
         self._keep_alive(now_ns)
-        if self._playing is not None:
-            self._advance(self._playing, asked.command, ack, now_ns)
+        if self._playing_ms is not None:
+            self._advance(self._playing_ms, asked.command, ack, now_ns)
 
-    def _advance(self, playing: _Playing, command: Command, ack: Ack, now_ns: int) -> None:
-        """Reports the start and the end of what plays, as the device tells them."""
+    def _advance(self, length_ms: int, command: Command, ack: Ack, now_ns: int) -> None:
+        """Reports start and end of what plays, as the device tells them; asks again when it should end."""
         if ack.status not in _DELIVERED:
             self._fail(now_ns)
             return
         if isinstance(command, Play):
-            played_ms = max(0, playing.length_ms - ack.remaining_ms)
+            played_ms = max(0, length_ms - ack.remaining_ms)
             self._reports.append(Report(Outcome.STARTED, now_ns - played_ms * _NS_PER_MS))
         if ack.remaining_ms == 0:
-            self._playing = None
+            self._playing_ms = None
             self._reports.append(Report(Outcome.FINISHED, now_ns))
             return
-        playing.end_ns = now_ns + ack.remaining_ms * _NS_PER_MS
-        self._ping_ns = min(self._ping_ns, playing.end_ns)
+        self._ping_ns = min(self._ping_ns, now_ns + ack.remaining_ms * _NS_PER_MS)
 
     def _keep_alive(self, now_ns: int) -> None:
         if self.device is not None:
@@ -253,8 +244,8 @@ class Session:
         self.device, self.fault = None, why
 
     def _fail(self, now_ns: int) -> None:
-        if self._playing is not None:
-            self._playing = None
+        if self._playing_ms is not None:
+            self._playing_ms = None
             self._reports.append(Report(Outcome.FAILED, now_ns))
 
     def _next_seq(self) -> int:

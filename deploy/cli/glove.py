@@ -14,23 +14,28 @@ EXAMPLE = """swarmtouch glove patterns distinct --compare paper
          swarmtouch glove play EI --glove serial:///dev/ttyACM0?calibration=mine.toml"""
 
 ACTIONS = {
-    "patterns": "list the pattern sets, or show, play, compare and draw one",
-    "ports": "list the serial ports of this machine",
-    "hello": "ask the device what it is, and how fast it answers",
-    "buzz": "vibrate one finger",
-    "play": "play one pattern, or all of a set",
-    "calibrate": "find out what each motor needs, and write it to a file",
-    "flash": "put the firmware on an Arduino UNO",
+    "patterns": ("list the pattern sets, or show, play, compare and draw one", "paper --compare distinct"),
+    "ports": ("list the serial ports of this machine", ""),
+    "hello": ("ask the device what it is, and how fast it answers", "--glove serial:///dev/ttyACM0"),
+    "buzz": ("vibrate one finger", "3 200 500"),
+    "play": ("play one pattern, or all of a set", "all --patterns flight"),
+    "calibrate": ("find out what each motor needs, and write it to a file", "--output mine.toml"),
+    "flash": ("put the firmware on an Arduino UNO", "--port /dev/ttyACM0"),
 }
-"""Action -> one line; the module `deploy.glove.<action>` does it."""
+"""Action -> one line, and an example; the module `deploy.glove.<action>` does it."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the actions, each with its own arguments."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     children = {
-        name: actions.add_parser(name, help=summary, description=f"Glove: {summary}.")
-        for name, summary in ACTIONS.items()
+        name: actions.add_parser(
+            name,
+            help=summary,
+            description=f"{summary.capitalize()}.",
+            epilog=f"example: swarmtouch glove {name} {example}",
+        )
+        for name, (summary, example) in ACTIONS.items()
     }
     _add_patterns(children["patterns"])
     for name in ("hello", "buzz", "play", "calibrate"):
