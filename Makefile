@@ -33,7 +33,8 @@ lint: $(DEVELOPMENT)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-chip:  ## the glove's firmware, its fuzzer, and a simulated chip that runs it, with Debian's packages
+# Debian: gcc libc6-dev gcc-avr avr-libc arduino-core-avr libsimavr-dev libelf-dev clang libclang-rt-14-dev
+chip:  ## the glove's firmware, its fuzzer, and a simulated chip that runs it; then pytest tests/chip
 	$(MAKE) -C glove_bridge/firmware BUILD=$(CURDIR)/build/firmware
 	$(MAKE) -C tests/chip/harness BUILD=$(CURDIR)/build/chip
 	$(MAKE) -C tests/chip/fuzz BUILD=$(CURDIR)/build/fuzz
