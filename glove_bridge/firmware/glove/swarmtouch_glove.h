@@ -131,49 +131,49 @@ class Receiver {
   bool keep_ = false;
 };
 
-// Builds a reply and puts it on the line.
+// A reply as it goes on the line, `00 COBS(packet crc) 00`, encoded as it is put together.
 class Reply {
  public:
   Reply& start(uint8_t type, uint8_t seq) {
-    packetSize_ = 0;
+    line_[0] = 0;
+    code_ = 1;
+    size_ = 2;
+    crc_ = kCrcStart;
     return put(type).put(seq);
   }
 
   Reply& put(uint8_t byte) {
-    packet_[packetSize_++] = byte;
+    crc_ = crcStep(crc_, byte);
+    if (byte == 0) {
+      endBlock();
+    } else {
+      line_[size_++] = byte;
+    }
     return *this;
   }
 
   Reply& put16(uint16_t value) { return put(static_cast<uint8_t>(value >> 8)).put(static_cast<uint8_t>(value)); }
 
-  // Closes the packet: `00 COBS(packet crc) 00`.
   void finish() {
-    uint16_t crc = kCrcStart;
-    for (uint8_t i = 0; i < packetSize_; ++i) crc = crcStep(crc, packet_[i]);
-    put16(crc);
-    uint8_t code_at = 1;
-    size_ = 2;
-    line_[0] = 0;
-    for (uint8_t i = 0; i < packetSize_; ++i) {
-      if (packet_[i] != 0) {
-        line_[size_++] = packet_[i];
-      } else {
-        line_[code_at] = static_cast<uint8_t>(size_ - code_at);
-        code_at = size_++;
-      }
-    }
-    line_[code_at] = static_cast<uint8_t>(size_ - code_at);
-    line_[size_++] = 0;
+    put16(crc_);
+    endBlock();
+    line_[code_] = 0;
   }
 
   const uint8_t* line() const { return line_; }
   uint8_t size() const { return size_; }
 
  private:
-  uint8_t packet_[kMaxReply];
+  // Writes how far it is to the next zero where COBS wants that, and makes room for the next such code.
+  void endBlock() {
+    line_[code_] = static_cast<uint8_t>(size_ - code_);
+    code_ = size_++;
+  }
+
   uint8_t line_[kMaxReply + 3];
-  uint8_t packetSize_ = 0;
+  uint8_t code_ = 1;  // where the code of the current block goes
   uint8_t size_ = 0;
+  uint16_t crc_ = kCrcStart;
 };
 
 // Plays a pattern frame by frame, or holds duties. Each frame starts where the one before ended: nothing drifts.
