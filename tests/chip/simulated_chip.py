@@ -21,6 +21,9 @@ CYCLES_PER_MS = 16_000
 SPREAD_MS = 0.3
 """The firmware sets the motors one after the other; changes this close together are one step."""
 
+REPORT_S = 2.0
+"""What a motor did is known here only after the host has its answer."""
+
 
 class Drive(NamedTuple):
     """Motor 1 (thumb) to 5 has had a duty (0..255) since `ms`; until then its pin was high for `high_ms`."""
@@ -118,6 +121,13 @@ class SimulatedChip:
         """Waits until an event makes a condition true; fails the test if none does in time."""
         with self._changed:
             assert self._changed.wait_for(lambda: condition(self), timeout_s), f"{timeout_s} s in vain"
+
+    def expect(self, *duties: tuple[int, ...]) -> None:
+        """Fails the test unless the motors have gone through these duties, and no others, in a moment."""
+        wanted = list(duties)
+        with self._changed:
+            self._changed.wait_for(lambda: [step.duties for step in self.steps] == wanted, REPORT_S)
+            assert [step.duties for step in self.steps] == wanted
 
     def _wait_event(self, name: str, since: int = 0) -> dict[str, Any]:
         self.wait(lambda chip: any(event["event"] == name for event in chip._events[since:]))

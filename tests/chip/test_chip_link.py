@@ -24,17 +24,13 @@ from glove_bridge.protocol import (
     Stop,
 )
 from tests.chip.asker import Asker
-from tests.chip.simulated_chip import SimulatedChip, Step
+from tests.chip.simulated_chip import SimulatedChip
 
 pytestmark = pytest.mark.chip
 
 REST = (0,) * 5
 ALL = (90, 100, 110, 120, 130)
 LATENCY_MS = 0.2
-
-
-def flat(steps: list[Step]) -> list[tuple[int, ...]]:
-    return [step.duties for step in steps]
 
 
 def test_a_repeated_pattern_plays_once(chip: SimulatedChip) -> None:
@@ -49,7 +45,7 @@ def test_a_repeated_pattern_plays_once(chip: SimulatedChip) -> None:
     assert statuses == [Status.OK, Status.DUPLICATE, Status.DUPLICATE, Status.STALE]
     assert answers[0].remaining_ms == 150
     assert answers[2].remaining_ms > 0
-    assert flat(chip.steps) == [ALL, REST, ALL, REST]
+    chip.expect(ALL, REST, ALL, REST)
 
 
 def test_a_repeated_greeting_interrupts_nothing_and_a_new_one_stops_everything(chip: SimulatedChip) -> None:
@@ -60,7 +56,7 @@ def test_a_repeated_greeting_interrupts_nothing_and_a_new_one_stops_everything(c
         assert asker.tell(Ping(2)).remaining_ms == HELD
         asker.greet(nonce=2)
         assert asker.tell(Ping(1)).remaining_ms == 0
-    assert flat(chip.steps) == [ALL, REST]
+    chip.expect(ALL, REST)
 
 
 @pytest.mark.parametrize("frames", [1, 3, 10, MAX_FRAMES])
@@ -107,8 +103,8 @@ def test_the_motors_stop_when_the_line_dies(
         chip.wait(lambda chip: len(chip.steps) == 2)
         chip.do("join")
         assert asker.tell(Ping(3)).status is Status.NO_SESSION
+    chip.expect(ALL, REST)
     silence = chip.steps[1].ms - chip.times("heard")[2]
-    assert flat(chip.steps) == [ALL, REST]
     assert link.deadman_ms <= silence <= 1.2 * link.deadman_ms
 
 
@@ -116,13 +112,12 @@ def test_noise_does_not_keep_the_motors_alive(chip: SimulatedChip) -> None:
     with Asker(chip.path) as asker:
         asker.greet()
         asker.tell(Set(1, ALL))
-        at = chip.times("heard")[1]
         until = time.monotonic() + 1.0
         while len(chip.steps) < 2 and time.monotonic() < until:
             asker.send(b"\x05\x05\x02\x00\x07" * 10)
             time.sleep(0.005)
-    assert flat(chip.steps) == [ALL, REST]
-    assert USB_DEADMAN_MS <= chip.steps[1].ms - at <= 1.2 * USB_DEADMAN_MS
+    chip.expect(ALL, REST)
+    assert USB_DEADMAN_MS <= chip.steps[1].ms - chip.times("heard")[1] <= 1.2 * USB_DEADMAN_MS
 
 
 def test_without_a_session_only_a_greeting_is_obeyed(chip: SimulatedChip) -> None:
@@ -144,8 +139,8 @@ def test_a_hung_firmware_is_reset_by_the_watchdog_and_its_motors_stop(chip: Simu
         assert asker.tell(Ping(2)).status is Status.NO_SESSION
         asker.greet()
         assert asker.tell(Set(1, ALL)).status is Status.OK
+    chip.expect(ALL, REST, ALL, REST)
     assert 0 < chip.steps[1].ms - hung < 200
-    assert flat(chip.steps)[1] == REST
 
 
 def test_a_reset_stops_the_motors_until_the_next_greeting(chip: SimulatedChip) -> None:
@@ -154,7 +149,7 @@ def test_a_reset_stops_the_motors_until_the_next_greeting(chip: SimulatedChip) -
         asker.tell(Play(1, (PlayFrame(3000, ALL),)))
         chip.do("reset")
         assert asker.tell(Ping(2)).status is Status.NO_SESSION
-    assert flat(chip.steps) == [ALL, REST]
+    chip.expect(ALL, REST)
 
 
 def test_at_the_wrong_rate_nothing_is_understood(start_chip: Callable[..., SimulatedChip]) -> None:
@@ -175,4 +170,4 @@ def test_a_flood_of_commands_costs_answers_and_nothing_else(chip: SimulatedChip)
         ack = asker.tell(Play(101, (PlayFrame(50, ALL),)))
         assert ack.status is Status.OK
         chip.wait(lambda chip: len(chip.drives) == 10)
-    assert flat(chip.steps) == [ALL, REST]
+    chip.expect(ALL, REST)

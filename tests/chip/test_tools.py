@@ -26,7 +26,7 @@ def test_hello_and_buzz(chip: SimulatedChip, capsys: pytest.CaptureFixture[str])
     assert "finger 2: started after" in capsys.readouterr().out
     calibration = load_calibration()
     kick, run = (wire_duty(duty) for duty in (calibration.limit(2), calibration.duty(2, 200.0)))
-    assert [step.duties for step in chip.steps] == [(0, kick, 0, 0, 0), (0, run, 0, 0, 0), OFF]
+    chip.expect((0, kick, 0, 0, 0), (0, run, 0, 0, 0), OFF)
     on, off = chip.steps[0].ms, chip.steps[-1].ms
     assert off - on == pytest.approx(300.0, abs=2.0)
 
@@ -34,6 +34,7 @@ def test_hello_and_buzz(chip: SimulatedChip, capsys: pytest.CaptureFixture[str])
 def test_a_pattern_by_radio(start_chip: Callable[..., SimulatedChip]) -> None:
     chip = start_chip("--xbee")
     assert main(["glove", "play", "CR", "--patterns", "flight", "--glove", f"{chip.uri}?link=xbee"]) == 0
+    chip.wait(lambda chip: not chip.turning)
     fingers = [{k + 1 for k, duty in enumerate(step.duties) if duty} for step in chip.steps]
     assert [f for k, f in enumerate(fingers) if k == 0 or f != fingers[k - 1]] == [{2}, {3}, {4}, set()]
 
@@ -50,6 +51,6 @@ def test_a_motor_that_is_being_calibrated_is_held(
     written = tmp_path / "mine.toml"
     assert main(["glove", "calibrate", "--glove", chip.uri, "--turn", "0.05", "--output", str(written)]) == 0
     assert load_calibration(written).motors["5"].start_duty < 0.1
-    assert not chip.turning
+    chip.wait(lambda chip: not chip.turning)
     for step in chip.steps:
         assert sum(map(bool, step.duties)) <= 1
