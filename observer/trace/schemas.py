@@ -4,12 +4,15 @@ A schema describes the decoded MessagePack map, and the same message in JSON. By
 and base64 in JSON; JSON Schema has a word for the latter only.
 """
 
+import base64
 import enum
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import attrs
+import msgpack
 
+from shared.codec import encode
 from shared.messages import SCHEMA_VERSION, Message, Range
 
 Schema = dict[str, Any]
@@ -40,6 +43,16 @@ def json_schema(kind: type[attrs.AttrsInstance]) -> Schema:
         schema["properties"] = {"v": {"const": SCHEMA_VERSION}, **schema["properties"]}
         schema["required"] = ["v", *schema["required"]]
     return schema
+
+
+def json_fields(message: Message) -> dict[str, Any]:
+    """Returns a message as its schema describes it, ready for JSON: the map that is sent, bytes as base64."""
+    fields: dict[str, Any] = msgpack.unpackb(encode(message))
+    return {name: _base64(value) if isinstance(value, bytes) else value for name, value in fields.items()}
+
+
+def _base64(value: bytes) -> str:
+    return base64.b64encode(value).decode()
 
 
 def _object(kind: type[attrs.AttrsInstance]) -> Schema:
@@ -76,6 +89,8 @@ def _class(kind: Any) -> Schema:
         return {"type": "string", "enum": [word.value for word in kind]}
     if issubclass(kind, enum.IntFlag):
         return {"type": "integer", "minimum": 0, "maximum": 2**_FLAG_BITS - 1}
+    if issubclass(kind, enum.IntEnum):
+        return {"type": "integer", "enum": [number.value for number in kind]}
     if issubclass(kind, tuple):
         return _array(tuple(get_type_hints(kind, include_extras=True).values()))
     return _object(kind)
@@ -83,6 +98,8 @@ def _class(kind: Any) -> Schema:
 
 def _array(kinds: tuple[Any, ...]) -> Schema:
     """Describes a tuple; all of its elements are of one type."""
+    if not kinds:
+        return {"type": "array", "maxItems": 0}
     schema: Schema = {"type": "array", "items": _schema(kinds[0])}
     if ... not in kinds:
         schema |= {"minItems": len(kinds), "maxItems": len(kinds)}
