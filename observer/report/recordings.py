@@ -179,7 +179,8 @@ def _record(flight: _Recording) -> FlightRecord:
 
 
 def _since(stamps: Stamps, first: Stamps) -> Vec:
-    return (stamps - first[0]) / NS_PER_S
+    seconds: Vec = (stamps - first[0]) / NS_PER_S
+    return seconds
 
 
 def _velocity(position: Vec) -> Vec:
