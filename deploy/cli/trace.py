@@ -13,7 +13,9 @@ directory. Record one with swarmtouch up --record, or join a flight with swarmto
 See docs/trace.md."""
 EXAMPLE = """swarmtouch trace info runs/latest
          swarmtouch trace echo "drone/*/state"
-         swarmtouch trace export runs/latest --foxglove flight.mcap"""
+         swarmtouch trace export runs/latest --foxglove flight.mcap
+         swarmtouch trace path 412 runs/latest --svg path.svg
+         swarmtouch trace report runs/latest -o report"""
 
 Declare = Callable[[argparse.ArgumentParser], object]
 
@@ -129,6 +131,31 @@ _ACTIONS = {
             _RUN,
             _argument("--foxglove", type=Path, metavar="F", help="write an MCAP file with Foxglove's schemas"),
             _argument("--csv", type=Path, metavar="DIR", help="write CSV tables: aligned.csv and one per key"),
+        ),
+    ),
+    "path": Action(
+        "follow one hand sample through the swarm: waiting, transport and compute of every hop",
+        "412 runs/latest --svg path.svg",
+        (
+            _argument("number", type=int, metavar="SEQ", help="number of the hand sample"),
+            _RUN,
+            _argument("--perfetto", type=Path, metavar="F", help="write JSON for ui.perfetto.dev"),
+            _argument("--svg", type=Path, metavar="F", help="write a space-time diagram"),
+        ),
+    ),
+    "report": Action(
+        "the paper's figures and tables of a flight, as one page and as files",
+        "runs/latest -o report",
+        (
+            _argument(
+                "runs",
+                nargs="+",
+                type=Path,
+                metavar="RUN",
+                help="run directory or MCAP file, flight folder, or ROS bag; of several, the figures show"
+                " the first, the tables all",
+            ),
+            _argument("-o", dest="output", type=Path, metavar="DIR", required=True, help="where to"),
         ),
     ),
 }
