@@ -8,7 +8,7 @@ import attrs
 from observer.histogram import Histogram, Quantiles
 from observer.trace.read import Record
 from shared.clock import NS_PER_S, Clock
-from shared.topics import topic_of
+from shared.topics import Delivery, topic_of
 from shared.transport import Bus, Publish
 
 PREFIX = "replay/"
@@ -61,4 +61,5 @@ def replay(
 
 
 def _publisher(bus: Bus, prefix: str, key: str) -> Publish:
-    return bus.publisher(attrs.evolve(topic_of(key), pattern=prefix + key))
+    # What many processes said is now said by one, in bursts that overflow the one-message queue of a state.
+    return bus.publisher(attrs.evolve(topic_of(key), pattern=prefix + key, delivery=Delivery.EVENT))

@@ -15,66 +15,12 @@ from observer.trace.read import Record, open_trace
 from observer.trace.schemas import json_schema
 from observer.trace.write import MOST_KEYS, TraceWriter
 from shared.codec import encode
-from shared.config import load_scenario
 from shared.errors import ConfigError
-from shared.messages import DroneState, HandSample, Message, Mode, Wish
+from shared.messages import DroneState, Message
 from shared.topics import DRONE_STATE, HAND, TOPICS
 from shared.transport import Arrival
 from tests.strategies import MESSAGES, fields_of
-
-SCENARIO = load_scenario("rhombus")
-START_NS = 1_700_000_000_000_000_000
-
-
-def hand(seq: int) -> HandSample:
-    return HandSample(
-        epoch=7,
-        seq=seq,
-        stamp_ns=START_NS + seq % 10**9 * 10,
-        position=(0.01 * seq % 1.0, 0.0, 1.5),
-        velocity=(0.6, 0.0, 0.0),
-        yaw=0.0,
-        mode=Wish.FLY,
-    )
-
-
-def state(drone: int, seq: int) -> DroneState:
-    zero = (0.0, 0.0, 0.0)
-    return DroneState(
-        epoch=8,
-        seq=seq,
-        stamp_ns=START_NS + seq * 10,
-        id=drone,
-        position=zero,
-        velocity=zero,
-        goal=zero,
-        goal_velocity=zero,
-        setpoint=zero,
-        mode=Mode.FOLLOW,
-    )
-
-
-def write(folder: Path, payloads: list[tuple[str, bytes]], every: int = 10, *, close: bool = True) -> Path:
-    """Writes a trace with a chunk for `every` so many payloads, the n-th logged n ms after the start."""
-    writer = TraceWriter(folder, SCENARIO)
-    for number, (key, payload) in enumerate(payloads):
-        writer.add(key, Arrival(payload, START_NS + number * 1_000_000))
-        if number % every == every - 1:
-            writer.flush(dropped=0)
-    if close:
-        writer.close(dropped=0)
-    else:
-        writer._file.close()
-    return writer.path
-
-
-def flight(length: int) -> list[tuple[str, bytes]]:
-    """Makes payloads of a hand and of two drones in turn."""
-    rounds = [
-        [(HAND.key(), encode(hand(n))), *((DRONE_STATE.key(id=i), encode(state(i, n))) for i in (1, 2))]
-        for n in range(length // 3)
-    ]
-    return [item for items in rounds for item in items]
+from tests.traces import SCENARIO, START_NS, STEP_NS, flight, hand, state, write
 
 
 def pairs(records: list[Record]) -> list[tuple[str, bytes]]:
@@ -96,7 +42,7 @@ def test_what_is_written_comes_back_byte_by_byte_and_in_order(tmp_path: Path) ->
     trace = open_trace(tmp_path)
     records = list(trace.records())
     assert pairs(records) == sent
-    assert [r.log_ns for r in records] == [START_NS + n * 1_000_000 for n in range(len(sent))]
+    assert [r.log_ns for r in records] == [START_NS + n * STEP_NS for n in range(len(sent))]
     assert (records[3].seq, records[3].publish_ns) == (1, START_NS + 10)
     assert [(r.seq, r.publish_ns - r.log_ns) for r in records[-5:]] == [(0, 0)] * 5
     assert (trace.scenario, trace.truncated, trace.faults) == (SCENARIO, False, [])
