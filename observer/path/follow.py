@@ -84,7 +84,7 @@ def most_unusual(path: HandPath, usual: Typical) -> Excess | None:
         Excess(hop, part, took_ns - usual.get((hop.sender, hop.listener, part), 0.0))
         for effect in _drone_effects(path)
         for hop, part, took_ns in _shares(effect)
-        if hop.arrival_ns >= effect.inputs[0].arrival_ns
+        if hop.arrival_ns >= effect.inputs[0].arrival_ns and hop.cause is not Cause.EARLIER
     )
     return max(candidates, key=lambda candidate: candidate.excess_ns, default=None)
 
@@ -114,7 +114,10 @@ def _drone_effect(flight: RecordedFlight, drone: int, number: int, sample: HandS
         for other in flight.formation.references(drone)
     }
     hand = _hand_hop(flight, number, sample, state.heard.get(HAND_KEY), step)
-    hops[HAND_NODE] = hand and evolve(hand, on_path=flight.formation.refers_to_human(drone))
+    if hand and not flight.formation.refers_to_human(drone):
+        cause = Cause.EARLIER if hand.skipped and direct < row else hand.cause
+        hand = evolve(hand, on_path=False, cause=cause)
+    hops[HAND_NODE] = hand
     return Effect(
         node=step.node,
         done_ns=state.stamp_ns,
