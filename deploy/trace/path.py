@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 from rich import box
+from rich.console import Console
 from rich.table import Table
 
 from deploy.launcher.console import open_console
@@ -35,9 +36,9 @@ def main(*, number: int, run: Path, perfetto: Path | None, svg: Path | None) -> 
     for line in (*remarks(path, most_unusual(path, usual)), *trace.faults):
         console.print(line)
     if perfetto is not None:
-        _write(perfetto, json.dumps(chrome_trace(path)))
+        _write(perfetto, json.dumps(chrome_trace(path)), console)
     if svg is not None:
-        _write(svg, draw_diagram(path))
+        _write(svg, draw_diagram(path), console)
     return 0 if path.effects else 1
 
 
@@ -106,9 +107,9 @@ def _clock(stamp_ns: int) -> str:
     return f"{time.strftime('%H:%M:%S', time.localtime(seconds))}.{rest // 1_000_000:03d}"
 
 
-def _write(path: Path, text: str) -> None:
+def _write(path: Path, text: str, console: Console) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error}") from error
-    print(path)
+    console.print(str(path), markup=False)

@@ -63,7 +63,7 @@ class _Diagram:
             x = self._x(i * step * 1e6)
             yield f'<path d="M{x:.1f} {_TOP - 14}V{bottom}" stroke="#eee"/>'
             yield f'<text x="{x:.1f}" y="{bottom + 16}" text-anchor="middle">{i * step:g}</text>'
-        yield f'<text x="8" y="{bottom + 16}">ms since</text>'
+        yield f'<text x="8" y="{bottom + 16}">time, ms</text>'
         for node, lane in self._lanes.items():
             y = _TOP + lane * _LANE
             yield f'<text x="8" y="{y + 4}" font-weight="bold">{escape(node)}</text>'

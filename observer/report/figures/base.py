@@ -23,8 +23,8 @@ Flights = Sequence[FlightRecord]
 """One flight or several; a figure of one flight shows the first."""
 
 AXES = "xyz"
-MOST_NAMED = 8
-"""A legend names at most so many drones or links."""
+MOST_NAMED = len(COLOURS)
+"""A legend names at most so many drones or links: then colours repeat."""
 
 _STYLE: dict[Any, Any] = {
     "axes.prop_cycle": cycler(color=COLOURS),
