@@ -5,7 +5,8 @@ the first state of a drone that contains the sample, or a newer one, through eve
 hop leads from the sender's first message that carries the sample to that of the listener.
 """
 
-from collections.abc import Iterable, Iterator
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
 from typing import NamedTuple
 
@@ -15,11 +16,14 @@ from observer.path.flight import RecordedFlight
 from observer.path.hop import GLOVE_NODE, HAND_NODE, Cause, Effect, HandPath, Hop, Part, drone_node
 from observer.through import HAND_KEY
 from shared.clock import NS_PER_S
-from shared.messages import HandSample, Heard, Message, PatternEvent
+from shared.messages import DroneState, HandSample, Heard, Message, PatternEvent
 from shared.topics import DRONE_STATE
 
 GLOVE_WINDOW_NS = NS_PER_S
 """A pattern that starts later than this after a sample is no effect of it."""
+
+STALL_NS = 50_000_000
+"""An agent steps at least every 25 ms; one that rests twice as long was stopped or starved."""
 
 _MOST_SAMPLES = 200
 
@@ -37,12 +41,12 @@ Typical = dict[tuple[str, str, Part], float]
 
 
 class _Step(NamedTuple):
-    """A listener's step: when it started, was done, and when the step before it started."""
+    """A listener's step: when it started and was done, and the states of the listener before it."""
 
     node: str
     start_ns: int
     done_ns: int
-    previous_ns: int
+    before: Sequence[DroneState] = ()
 
 
 def follow(flight: RecordedFlight, number: int) -> HandPath:
@@ -107,8 +111,7 @@ def _drone_effect(flight: RecordedFlight, drone: int, number: int, sample: HandS
     if row is None or direct is None:
         return None
     state = flown.states[row]
-    previous_ns = flown.states[row - 1].step_ns if row else 0
-    step = _Step(drone_node(drone), state.step_ns, state.stamp_ns, previous_ns)
+    step = _Step(drone_node(drone), state.step_ns, state.stamp_ns, flown.states[:row])
     hops = {
         drone_node(other): _drone_hop(flight, other, number, state.heard.get(DRONE_STATE.key(id=other)), step)
         for other in flight.formation.references(drone)
@@ -150,7 +153,7 @@ def _glove_effect(flight: RecordedFlight, number: int, sample: HandSample) -> Ef
 def _glove_hops(flight: RecordedFlight, event: PatternEvent, number: int) -> Iterator[Hop | None]:
     """Yields a hop for every drone whose state brought the pattern about; the step is the bridge's."""
     cause = flight.formation_states.get((event.epoch, event.state_seq))
-    step = _Step(GLOVE_NODE, cause.stamp_ns if cause else event.started_ns, event.started_ns, 0)
+    step = _Step(GLOVE_NODE, cause.stamp_ns if cause else event.started_ns, event.started_ns)
     for drone in flight.formation.ids:
         hop = _drone_hop(flight, drone, number, event.heard.get(DRONE_STATE.key(id=drone)), step)
         yield hop and evolve(hop, cause=Cause.PATTERN if hop.skipped else Cause.NONE)
@@ -189,11 +192,20 @@ def _hop(sender: str, first: Message, used: Message, heard: Heard, step: _Step) 
 
 
 def _cause(first: Message, used: Message, heard: Heard, step: _Step) -> Cause:
-    """Says why not the first message was used: a listener that steps without it has not got it in time."""
+    """Says why not the first message was used.
+
+    A listener that steps as usual without it has not got it in time. One that does not step until it uses a
+    newer one was busy; and one that stood still when the first should have arrived may well step once, on
+    what it knew before, as soon as it runs again.
+    """
     if (first.epoch, first.seq) == (used.epoch, used.seq):
         return Cause.NONE
     expected_ns = first.stamp_ns + heard.arrival_ns - used.stamp_ns
-    return Cause.LINK if step.previous_ns > expected_ns else Cause.LISTENER
+    row = bisect_right(step.before, expected_ns, key=lambda state: state.step_ns)
+    if row == len(step.before):
+        return Cause.LISTENER
+    gap_ns = step.before[row].step_ns - step.before[row - 1].step_ns if row else 0
+    return Cause.LISTENER if gap_ns > STALL_NS else Cause.LINK
 
 
 def _deciding_first(hops: Iterable[Hop | None]) -> tuple[Hop, ...]:

@@ -34,7 +34,7 @@ class Cause(enum.StrEnum):
 
     NONE = ""
     LINK = "lost or late on the link"
-    LISTENER = "overtaken: the listener was busy"
+    LISTENER = "overtaken: the listener was busy or stopped"
     EARLIER = "an earlier step had used it"
     PATTERN = "no pattern was called for, or the glove was busy"
 

@@ -140,6 +140,26 @@ def test_what_a_stalled_drone_misses_is_its_own_doing() -> None:
     check_sums(path)
 
 
+def test_a_step_on_old_inputs_after_a_stall_does_not_blame_the_link() -> None:
+    """A stopped process runs again before its messages are delivered."""
+    begin, end = HIT - 2, HIT + 3
+
+    def late(a: str, b: int, seq: int) -> int | None:
+        if b != 2 or not begin < seq < end:
+            return usual_delay(a, b, seq)
+        return (end - seq) * TICK + FALLBACK
+
+    def stopped(drone: int, tick: int) -> int:
+        return 6 * TICK if (drone, tick) == (2, begin) else MS
+
+    path, (hop, _, _) = unusual(late, stopped)
+    assert hop.listener == "drone 2"
+    missed = path.effects["drone 2"].inputs[0]
+    assert missed.skipped
+    assert missed.cause is Cause.LISTENER
+    check_sums(path)
+
+
 def test_the_first_step_with_the_hands_velocity_may_come_before_the_reference() -> None:
     path = follow(RecordedFlight(RHOMBUS, fly(TICKS, held_up("drone 1", 2, None))), HIT)
     effect = path.effects["drone 2"]
