@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from deploy.cli.arguments import seconds
+from deploy.cli.arguments import count, seconds
 
 DESCRIPTION = """A trace is every message of a flight, byte by byte as it was sent, in MCAP files in the run
 directory. Record one with swarmtouch up --record, or join a flight with swarmtouch trace record.
@@ -96,7 +96,7 @@ _ACTIONS = {
         (
             _argument("key", metavar="KEY", help="a key; * stands for one part of it, as in drone/*/state"),
             _argument("source", nargs="?", metavar="SWARM", help=_SOURCE_HELP),
-            _argument("--count", type=int, metavar="N", help="end after N messages (default: at Ctrl-C)"),
+            _argument("--count", type=count, metavar="N", help="end after N messages (default: at Ctrl-C)"),
         ),
     ),
     "replay": Action(
@@ -117,7 +117,7 @@ _ACTIONS = {
             ),
             _argument(
                 "--delay",
-                type=float,
+                type=seconds,
                 default=2.0,
                 metavar="S",
                 help="time for listeners to connect (default: 2)",

@@ -12,7 +12,7 @@ from observer.trace.read import decode_on
 from observer.trace.replay import PREFIX
 from observer.trace.schemas import json_fields
 from shared.clock import system_clock
-from shared.errors import DecodeError
+from shared.errors import ConfigError, DecodeError
 from shared.process import prepare_process
 from shared.transport import Arrival
 
@@ -21,12 +21,24 @@ _SHOWN_BYTES = 32
 
 
 def main(*, key: str, source: str | None, count: int | None) -> int:
-    """Prints one line of JSON per message until Ctrl-C or `count`; returns the exit code."""
+    """Prints one line of JSON per message until Ctrl-C or `count`; returns the exit code, 1 if none came."""
+    _check(key)
     scenario = running_scenario(source)
     stopping = prepare_process("echo")
     batches = listen(scenario, [key], system_clock(), stopping, _PERIOD_S)
     heard = (line(*item) for batch in batches for item in batch)
     return 0 if _print(islice(heard, count)) else 1
+
+
+def _check(key: str) -> None:
+    """Refuses what is no key expression.
+
+    Raises:
+        ConfigError: A part is empty, or has `*` beside other characters or one of `#?$`.
+    """
+    for part in key.split("/"):
+        if part not in ("*", "**") and (not part or any(character in part for character in "*#?$")):
+            raise ConfigError(f"trace echo {key}: not a key; for example human/hand or drone/*/state")
 
 
 def _print(lines: Iterator[str]) -> int:

@@ -34,6 +34,8 @@ _COLUMNS = (
 def main(*, run: str | None, live: bool, links: bool, seconds: float | None, as_json: bool) -> int:
     """Shows the links; returns the exit code, 1 if nothing was heard."""
     console = open_console(stderr=False)
+    if not console.is_terminal:
+        console.width = _WIDTH
     if live:
         swarm, now_ns = _hear(run, seconds, console, everybody=links)
     else:
@@ -46,9 +48,7 @@ def main(*, run: str | None, live: bool, links: bool, seconds: float | None, as_
         for row in rows:
             print(json.dumps({**attrs.asdict(row), "rejected": swarm.rejected[row.key]}))
     else:
-        console.print(
-            link_table(rows, swarm, now_ns), width=None if console.is_terminal else _WIDTH, crop=False
-        )
+        console.print(link_table(rows, swarm, now_ns))
         print_lines(console, complaints(swarm))
     return 0 if rows else 1
 
