@@ -50,8 +50,9 @@ def test_command_lines() -> None:
 
 
 def test_a_recorder_hears_it_all_from_the_start() -> None:
-    recorder = rows_of(RHOMBUS, record=True)[0]
-    assert recorder.token == "observer/0"
+    recorder, *others = rows_of(RHOMBUS, record=True)
+    assert recorder.name == "observer"
+    assert others == list(rows_of(RHOMBUS))
     assert recorder.restarts
     assert recorder.command[3:] == ("observer", "--scenario", "/runs/1/scenario.toml", "--run-dir", "/runs/1")
 
