@@ -43,6 +43,7 @@ class FlightRecord:
         obstacles: Columns.
         safety_radius: Of the zone around a column's centre in which avoidance acts, m.
         patterns: What the operator felt.
+        mapping_known: Whether it is known how the hand was mapped; if not, `mapped` is the hand itself.
     """
 
     name: str
@@ -61,11 +62,17 @@ class FlightRecord:
     obstacles: tuple[Obstacle, ...]
     safety_radius: float
     patterns: tuple[Played, ...] = ()
+    mapping_known: bool = True
 
     @property
     def ids(self) -> tuple[int, ...]:
         """Returns the numbers of the drones, in the order of the columns."""
         return self.formation.ids
+
+    @property
+    def hand_label(self) -> str:
+        """Returns what to call `mapped` in a figure."""
+        return "mapped hand" if self.mapping_known else "hand"
 
 
 def mapped_hand(position: Vec, hand: Hand) -> Vec:

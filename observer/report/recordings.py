@@ -175,6 +175,7 @@ def _record(flight: _Recording) -> FlightRecord:
         obstacles=flight.obstacles,
         safety_radius=flight.safety_radius,
         patterns=_played(flight.patterns, int(arrivals[0])),
+        mapping_known=flight.mapping is not None,
     )
 
 

@@ -67,6 +67,7 @@ def test_a_bag_gives_the_numbers_of_its_flight_folder() -> None:
     assert attrs.astuple(fleet_row(bag)) == pytest.approx(attrs.astuple(fleet_row(folder)), rel=1e-4)
     assert np.abs(bag.position - folder.position).max() < 1e-6
     assert np.abs(bag.setpoint - folder.setpoint).max() < 1e-6
+    assert (bag.hand_label, folder.hand_label) == ("hand", "mapped hand")
     assert {o.name for o in bag.obstacles} == {o.name for o in folder.obstacles}
     places = [{o.name: (o.x, o.y) for o in flight.obstacles} for flight in (bag, folder)]
     assert all(places[0][name] == pytest.approx(places[1][name], abs=1e-6) for name in places[0])

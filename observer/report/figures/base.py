@@ -98,7 +98,7 @@ def draw_columns(axes: "Axes", record: FlightRecord) -> None:
 
 def draw_paths(axes: "Axes", record: FlightRecord) -> None:
     """Draws the ways of the mapped hand and of every drone, from above."""
-    axes.plot(record.mapped[:, 1], record.mapped[:, 0], color=HAND, lw=1.0, ls="--", label="mapped hand")
+    axes.plot(record.mapped[:, 1], record.mapped[:, 0], color=HAND, lw=1.0, ls="--", label=record.hand_label)
     for index, drone in enumerate(record.ids):
         label = f"drone {drone}" if index < MOST_NAMED else None
         path = record.position[:, index]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 def _draw(figure: "Figure", flights: Flights) -> None:
     record = flights[0]
     curves = (
-        ("mapped hand", record.mapped, {"color": HAND, "ls": "--", "zorder": 3}),
+        (record.hand_label, record.mapped, {"color": HAND, "ls": "--", "zorder": 3}),
         ("goal", record.goal[:, 0], {"color": COLOURS[4], "lw": 2.2}),
         ("set-point", record.setpoint[:, 0], {"color": COLOURS[2]}),
         ("actual", record.position[:, 0], {"color": COLOURS[0]}),
