@@ -150,8 +150,9 @@ class SwarmLinks:
             self.processes[f"{message.role}/{message.id}"] = message
 
     def reject(self, key: str, reason: str) -> None:
-        """Counts one payload that is no valid message."""
+        """Counts one payload that is no valid message; its link has a row, be it without messages."""
         self.rejected[key][reason] += 1
+        self._link(key, OBSERVER)
 
     def rows(self) -> list[LinkSummary]:
         """Returns the observer's links in the order of the table of topics, then everybody else's."""

@@ -93,6 +93,14 @@ def test_the_links_of_others_are_known_from_what_they_say_they_heard() -> None:
     assert rows[HAND.key(), OBSERVER].missing == 0
 
 
+def test_a_key_on_which_only_garbage_came_has_a_row() -> None:
+    swarm = SwarmLinks()
+    swarm.reject("drone/9/state", "malformed")
+    (row,) = swarm.rows()
+    assert (row.key, row.listener, row.messages, row.last_ns) == ("drone/9/state", OBSERVER, 0, 0)
+    assert swarm.rejected["drone/9/state"] == {"malformed": 1}
+
+
 def test_rows_are_in_the_order_of_people() -> None:
     swarm = SwarmLinks()
     for drone in (10, 2, 1):
