@@ -6,15 +6,15 @@ from attrs import frozen
 
 from observer.hand_log import HandLog
 from observer.histogram import Histogram, Quantiles
+from observer.through import HAND_KEY, newest_through
 from shared.clock import NS_PER_S
 from shared.formation import Formation
 from shared.messages import DroneState, Heard, Mode
-from shared.topics import DRONE_STATE, HAND
+from shared.topics import DRONE_STATE
 
 ON_TIME_NS = 4_000_000
 """A step is on time if it starts within this time of the last input it needed."""
 _REMEMBERED_STATES = 512
-_HAND = HAND.key()
 
 
 @frozen(kw_only=True)
@@ -77,7 +77,7 @@ class AgentLog:
             hands: Every hand sample up to now.
             agents: The logs of all agents; those of the references must be up to date.
         """
-        if _HAND not in state.heard or self._is_old(state):
+        if HAND_KEY not in state.heard or self._is_old(state):
             return
         previous = self._previous
         if previous is None or previous.epoch != state.epoch:
@@ -85,7 +85,7 @@ class AgentLog:
             self._use.start_epoch()
         self._count_step(state, previous)
         self._count_punctuality(state, previous)
-        self._use.add(hands.number(state.heard[_HAND]), hands.sent_by(state.step_ns))
+        self._use.add(hands.number(state.heard[HAND_KEY]), hands.sent_by(state.step_ns))
         self._follow_hand(state, hands, agents)
         if state.mode is Mode.FOLLOW:
             self._square_error += math.dist(state.position, state.goal) ** 2
@@ -127,7 +127,7 @@ class AgentLog:
         before = previous.heard if previous else {}
         new = [
             heard.arrival_ns
-            for key in (_HAND, *self._references)
+            for key in (HAND_KEY, *self._references)
             if (heard := state.heard.get(key)) and heard[:2] != before.get(key, (0, 0, 0))[:2]
         ]
         if new:
@@ -136,14 +136,12 @@ class AgentLog:
             self._lateness.add(late_ns / 1e6)
 
     def _follow_hand(self, state: DroneState, hands: HandLog, agents: "dict[int, AgentLog]") -> None:
-        paths = [
-            agents[reference].through(heard)
-            for key, reference in self._references.items()
-            if (heard := state.heard.get(key))
-        ]
-        if self._follows_hand:
-            paths.append(hands.number(state.heard[_HAND]))
-        newest = max((path for path in paths if path is not None), default=None)
+        newest = newest_through(
+            state,
+            hands if self._follows_hand else None,
+            self._references,
+            lambda drone, heard: agents[drone].through(heard),
+        )
         if newest is None:
             return
         self._remember(state, newest)

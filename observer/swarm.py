@@ -18,7 +18,7 @@ SCENARIO_FILE = "scenario.toml"
 
 
 def open_observer(scenario: Scenario) -> ZenohBus:
-    """Opens a bus that hears every node of a swarm; any number of observers may do so at once.
+    """Opens a bus to every node of a swarm, the launcher included; any number of observers may do so at once.
 
     Args:
         scenario: The resolved scenario: `net.endpoints` says where the nodes are.

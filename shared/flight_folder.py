@@ -1,8 +1,8 @@
 """Reads a folder of a recorded flight: hand, drones, set-points, obstacles and what is known of its law.
 
 The layout is that of the recordings of the original experiments: `glove.csv.gz`, `cf1..3.csv.gz`,
-`cf1..3_sp.csv.gz`, `obstacles.csv`, `meta.json`. Metres, nanoseconds since the epoch, quaternions x, y, z, w,
-world frame z up.
+`cf1..3_sp.csv.gz`, `obstacles.csv`, `meta.json`, `pattern_topic.csv.gz` where patterns were felt. Metres,
+nanoseconds since the epoch, quaternions x, y, z, w, world frame z up.
 """
 
 import json
@@ -18,6 +18,7 @@ from shared.errors import ConfigError
 from shared.scenario import Obstacle, Pair
 
 HAND_FILE = "glove.csv.gz"
+PATTERN_FILE = "pattern_topic.csv.gz"
 
 
 class Track(NamedTuple):
@@ -89,6 +90,33 @@ def read_setpoints(path: Path) -> Setpoints:
     """
     stamps, numbers = read_table(path, integers=("t_ns",), numbers=("x", "y", "z"))
     return Setpoints(check_increasing(path, stamps[:, 0]), numbers)
+
+
+def read_arrivals(path: Path) -> Stamps:
+    """Reads when each row of `cf<i>.csv.gz` or `glove.csv.gz` arrived at the recorder, (n,) ns.
+
+    Raises:
+        ConfigError: Names the file and the row.
+    """
+    return read_table(path, integers=("t_bag_ns",))[0][:, 0]
+
+
+def read_patterns(folder: Path) -> tuple[tuple[int, str], ...]:
+    """Reads the patterns that the operator felt: arrival at the recorder (ns) and name; none if felt nothing.
+
+    Raises:
+        ConfigError: Names the file and the row.
+    """
+    path = folder / PATTERN_FILE
+    if not path.is_file():
+        return ()
+    header, *rows = read_rows(path)
+    if "name" not in header:
+        raise ConfigError(f"{path}: no column name; expected the header t_bag_ns,name")
+    stamps, _ = read_table(path, integers=("t_bag_ns",))
+    names = (row[header.index("name")] for row in rows)
+    # A row without a name is a tick of the original loop at which nothing was played.
+    return tuple((t, name) for t, name in zip(stamps[:, 0].tolist(), names, strict=True) if name)
 
 
 def read_obstacles(folder: Path) -> tuple[Obstacle, ...]:

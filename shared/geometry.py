@@ -6,7 +6,7 @@ Point = tuple[float, float]
 
 
 def hull_area(points: Iterable[Point]) -> float:
-    """Area of the convex hull (monotone chain).
+    """Area of the convex hull.
 
     Args:
         points: Horizontal positions (x, y), m, in any order.
@@ -14,12 +14,17 @@ def hull_area(points: Iterable[Point]) -> float:
     Returns:
         Area in m^2; 0 for fewer than three points or when all lie on one line.
     """
+    corners = hull(points)
+    following = corners[1:] + corners[:1]
+    return 0.5 * abs(sum(x * v - u * y for (x, y), (u, v) in zip(corners, following, strict=True)))
+
+
+def hull(points: Iterable[Point]) -> list[Point]:
+    """Returns the corners of the convex hull in order (monotone chain); of points on a line, its ends."""
     ordered = sorted(set(points))
     if len(ordered) < 3:
-        return 0.0
-    hull = _chain(ordered) + _chain(ordered[::-1])
-    following = hull[1:] + hull[:1]
-    return 0.5 * abs(sum(x * v - u * y for (x, y), (u, v) in zip(hull, following, strict=True)))
+        return ordered
+    return _chain(ordered) + _chain(ordered[::-1])
 
 
 def _chain(ordered: list[Point]) -> list[Point]:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Self
 
-from shared.topics import ALIVE, Topic
+from shared.topics import ALIVE, Topic, matches
 from shared.transport import Inbox, Publish
 
 _PRESENCE_PREFIX = ALIVE.split("/", maxsplit=1)[0]
@@ -79,15 +79,10 @@ class MemoryBus:
     def deliver(self, key: str, payload: bytes) -> None:
         """Puts a payload of another participant into the matching inboxes."""
         for expression, inbox in self._subscriptions:
-            if _matches(expression, key):
+            if matches(expression, key):
                 inbox.put(key, payload)
 
     def _tell(self, token: str, *, present: bool) -> None:
         for bus in self._network.buses:
             for watcher in bus.watchers:
                 watcher(token, present)
-
-
-def _matches(expression: str, key: str) -> bool:
-    pattern, chunks = expression.split("/"), key.split("/")
-    return len(pattern) == len(chunks) and all(p in ("*", c) for p, c in zip(pattern, chunks, strict=True))

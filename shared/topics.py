@@ -67,17 +67,25 @@ ALIVE = "alive/{role}/{id}"
 """Key of a process's liveliness token."""
 
 
+def matches(expression: str, key: str) -> bool:
+    """Says whether a key expression (`*` is one chunk) covers a key."""
+    pattern, chunks = expression.split("/"), key.split("/")
+    return len(pattern) == len(chunks) and all(p in ("*", c) for p, c in zip(pattern, chunks, strict=True))
+
+
+def rank(key: str) -> tuple[int, tuple[tuple[int, str], ...]]:
+    """Sorts keys for people: in the order of the table, numbers as numbers, what is in no row last."""
+    row = next((n for n, topic in enumerate(TOPICS) if matches(topic.wildcard, key)), len(TOPICS))
+    return row, tuple((int(chunk), "") if chunk.isdecimal() else (0, chunk) for chunk in key.split("/"))
+
+
 def topic_of(key: str) -> Topic:
     """Finds the row that a concrete key belongs to.
 
     Raises:
         DecodeError: No topic has such a key.
     """
-    chunks = key.split("/")
     for topic in TOPICS:
-        pattern = topic.pattern.split("/")
-        if len(pattern) == len(chunks) and all(
-            p.startswith("{") or p == c for p, c in zip(pattern, chunks, strict=True)
-        ):
+        if matches(topic.wildcard, key):
             return topic
     raise DecodeError("unknown-key", key)

@@ -11,6 +11,7 @@ from shared.process import explain
 COMMANDS = {
     "up": "fly a scenario with real processes on this machine",
     "glove": "show, play and compare tactile patterns",
+    "trace": "record, inspect, export and replay what a swarm says",
     "bench": "measure speed and cost against the floor of the transport",
     "sim": "fly a scenario on a virtual clock in one process",
     "net": "keys of a swarm and the network configuration of its nodes",

@@ -32,6 +32,18 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def count(text: str) -> int:
+    """Reads how many.
+
+    Raises:
+        argparse.ArgumentTypeError: It is not 1 or more.
+    """
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} must be at least 1")
+    return value
+
+
 def seconds(text: str) -> float:
     """Reads a duration, s.
 

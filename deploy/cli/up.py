@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="last line of stdout is the summary as JSON; the rest goes to stderr",
     )
     parser.add_argument("--no-live", action="store_true", help="plain lines instead of a live table")
+    parser.add_argument("--record", action="store_true", help="record every message: see swarmtouch trace")
     parser.add_argument("-v", "--verbose", action="store_true", help="the processes log debugging details")
 
 
@@ -66,6 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
             runs=arguments.runs,
             json=arguments.json,
             live=not arguments.no_live,
+            record=arguments.record,
             verbose=arguments.verbose,
         )
     )

@@ -43,6 +43,7 @@ class Options:
         runs: Directory of all runs.
         json: Whether the summary goes to stdout as one line of JSON and everything else to stderr.
         live: Whether a terminal gets a live table.
+        record: Whether everything is recorded in the run directory.
         verbose: Whether the processes log debugging details.
     """
 
@@ -54,6 +55,7 @@ class Options:
     runs: Path = Path("runs")
     json: bool = False
     live: bool = True
+    record: bool = False
     verbose: bool = False
 
 
@@ -107,6 +109,7 @@ async def _fly(
         hand=options.hand,
         run_dir=run_dir,
         glove=options.glove,
+        record=options.record,
         verbose=options.verbose,
     )
     live = options.live and console.is_terminal

@@ -19,6 +19,7 @@ WORLD = "world"
 DRONE = "drone"
 BRIDGE = "bridge"
 RELAY = "relay"
+OBSERVER = "observer"
 
 
 @frozen(kw_only=True)
@@ -71,6 +72,7 @@ def process_table(
     hand: str,
     run_dir: Path,
     glove: GloveChoice | None = None,
+    record: bool = False,
     verbose: bool = False,
 ) -> tuple[ProcessRow, ...]:
     """Derives the processes of a flight on this machine, in the order in which they start.
@@ -82,11 +84,12 @@ def process_table(
         hand: URI of the hand source.
         run_dir: Directory of this run.
         glove: What the operator wears, None for nothing.
+        record: Whether everything is recorded.
         verbose: Whether the processes log debugging details.
 
     Returns:
-        The world (if a vehicle is simulated), one agent per drone, the bridge to the glove (if there is one),
-        and the relay last: a hand may only begin to move when everybody listens.
+        The recorder (if there is one), the world (if a vehicle is simulated), one agent per drone, the bridge
+        to the glove (if there is one), and the relay last: a hand may only begin to move when everybody hears.
     """
     common = ("--scenario", str(file), *(("-v",) if verbose else ()))
     agents = tuple(
@@ -101,8 +104,12 @@ def process_table(
     )
     worn = ("--glove", glove.uri, "--patterns", glove.patterns) if glove else ()
     bridge = ProcessRow(role=BRIDGE, number=0, command=_python("glove_bridge", *common, *worn))
+    recorder = ProcessRow(
+        role=OBSERVER, number=0, command=_python("observer", *common, "--run-dir", str(run_dir))
+    )
     simulated = any((vehicle_settings(scenario, i).uri or "").startswith("sim:") for i in formation.ids)
-    return (*((world,) if simulated else ()), *agents, *((bridge,) if glove else ()), relay)
+    watchers = (recorder,) if record else ()
+    return (*watchers, *((world,) if simulated else ()), *agents, *((bridge,) if glove else ()), relay)
 
 
 def resolve_scenario(

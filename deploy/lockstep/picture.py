@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from deploy.lockstep.record import Record
+from observer.colours import COLOURS, HAND, drone_colour
 from shared.errors import ConfigError
 from shared.fence import fence_box
 from shared.scenario import Scenario
@@ -13,9 +14,6 @@ from shared.scenario import Scenario
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's colours: told apart by colour-blind readers too.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-HAND = "#222222"
 SNAPSHOTS = 4
 """How often the whole formation is drawn along the way."""
 
@@ -65,7 +63,7 @@ def _draw_paths(axes: "Axes", record: Record) -> None:
     axes.plot(hand[:, 1], hand[:, 0], color=HAND, lw=1.2, ls="--", label="hand")
     for row, drone in enumerate(record.formation.ids):
         x, y = record.position[:, row, 0], record.position[:, row, 1]
-        axes.plot(y, x, color=COLOURS[row % len(COLOURS)], lw=1.0, alpha=0.7, label=f"drone {drone}")
+        axes.plot(y, x, color=drone_colour(row), lw=1.0, alpha=0.7, label=f"drone {drone}")
 
 
 def _draw_formation(axes: "Axes", record: Record, tick: int, strength: float) -> None:
@@ -75,7 +73,7 @@ def _draw_formation(axes: "Axes", record: Record, tick: int, strength: float) ->
             ends = places[[reference, row + 1]]
             axes.plot(ends[:, 1], ends[:, 0], color="0.35", lw=1.0, alpha=strength, zorder=3)
     axes.scatter(places[0, 1], places[0, 0], marker="*", s=90, color=HAND, alpha=strength, zorder=4)
-    colours = [COLOURS[row % len(COLOURS)] for row in range(len(places) - 1)]
+    colours = [drone_colour(row) for row in range(len(places) - 1)]
     axes.scatter(places[1:, 1], places[1:, 0], s=45, c=colours, ec="white", lw=0.8, alpha=strength, zorder=5)
 
 

@@ -86,7 +86,7 @@ def read_recording(path: Path, topic: str = BAG_TOPIC) -> Track:
     if path.is_dir():
         return read_track(path / HAND_FILE)
     if path.suffix == ".bag":
-        from human_relay.sources.ros_bag import read_bag  # noqa: PLC0415  rosbags is an optional extra
+        from shared.ros_bag import read_bag  # noqa: PLC0415  rosbags is an optional extra
 
         return read_bag(path, topic)
     return read_csv(path)

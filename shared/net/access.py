@@ -49,7 +49,8 @@ def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
     Returns:
         Zenoh's `access_control` section. What is not allowed is dropped on arrival.
     """
-    others = [member for member in members if member != node]
+    # There may be several observers, which hear each other's status.
+    others = [member for member in members if member != node or node == OBSERVER]
     rules = [_rule("out", ["**"], [*HEARING, "put", "reply", "liveliness_token"], "egress")]
     policies = [{"rules": ["out"], "subjects": ["anyone"]}]
     heard = [f"{swarm}/{key}" for key in (*(topic.wildcard for topic in TOPICS), "alive/**")]

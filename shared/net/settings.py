@@ -57,10 +57,10 @@ def node_settings(
                 "net.router: a router would speak for everybody; with net.keys nodes link directly"
             )
         return [client_settings(scenario.swarm.name, net.router, adminspace=net.adminspace)]
-    listen = endpoint(scenario, formation, node) if listening else ""
-    mesh = peer_settings(
-        scenario.swarm.name, listen, dials(scenario, formation, node), adminspace=net.adminspace
-    )
+    own, others = endpoint(scenario, formation, node), dials(scenario, formation, node)
+    # Who listens in the same place, as the launcher does in an observer's, is heard as well.
+    listen, connect = (own, others) if listening else ("", [*others, own])
+    mesh = peer_settings(scenario.swarm.name, listen, connect, adminspace=net.adminspace)
     if net.keys:
         _secure(mesh, Keyring(Path(net.keys)), scenario.swarm.name, node)
     elif net.profile == "field":

@@ -151,9 +151,12 @@ class Launched:
 
 
 @contextmanager
-def launched(name: str, hand: str, runs: Path, *overrides: str) -> Iterator[Launched]:
+def launched(
+    name: str, hand: str, runs: Path, *overrides: str, arguments: Sequence[str] = ()
+) -> Iterator[Launched]:
     """Flies by `swarmtouch up`; begins when the whole formation follows, and ends for sure."""
     command = [sys.executable, "-m", "deploy.cli", "up", name, "--hand", hand, "--runs", str(runs), "--json"]
+    command += arguments
     command += [argument for override in overrides for argument in ("--set", override)]
     file = runs / "latest" / "scenario.toml"
     with (runs / "launcher.log").open("wb") as log:

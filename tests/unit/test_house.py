@@ -26,7 +26,12 @@ PURE = [
     ),
     *sorted((ROOT / "glove_bridge/rules").glob("*.py")),
     *(ROOT / f"glove_bridge/patterns/{name}.py" for name in ("pattern", "schema")),
-    *(ROOT / f"observer/{name}.py" for name in ("flight_stats", "agent_log", "hand_log", "histogram")),
+    *(
+        ROOT / f"observer/{name}.py"
+        for name in ("flight_stats", "agent_log", "hand_log", "histogram", "through")
+    ),
+    *sorted((ROOT / "observer/path").glob("*.py")),
+    *(ROOT / f"observer/report/{name}.py" for name in ("record", "tables", "page")),
     *(
         ROOT / f"shared/{name}.py"
         for name in (

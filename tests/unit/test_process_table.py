@@ -19,13 +19,14 @@ FORMATION = build_formation(RHOMBUS)
 PORTS = list(range(9001, 9001 + len(all_nodes(FORMATION))))
 
 
-def rows_of(scenario: Scenario, *, verbose: bool = False) -> tuple[ProcessRow, ...]:
+def rows_of(scenario: Scenario, *, record: bool = False, verbose: bool = False) -> tuple[ProcessRow, ...]:
     return process_table(
         scenario,
         build_formation(scenario),
         file=Path("/runs/1/scenario.toml"),
         hand="scripted:tour",
         run_dir=Path("/runs/1"),
+        record=record,
         verbose=verbose,
     )
 
@@ -46,6 +47,14 @@ def test_command_lines() -> None:
     assert rows["relay"] == (*python, "human_relay", *scenario, "--hand", "scripted:tour")
     assert rows["world"] == (*python, "agents.vehicles.world", *scenario, "--run-dir", "/runs/1")
     assert all("-v" in row.command for row in rows_of(RHOMBUS, verbose=True))
+
+
+def test_a_recorder_hears_it_all_from_the_start() -> None:
+    recorder, *others = rows_of(RHOMBUS, record=True)
+    assert recorder.name == "observer"
+    assert others == list(rows_of(RHOMBUS))
+    assert recorder.restarts
+    assert recorder.command[3:] == ("observer", "--scenario", "/runs/1/scenario.toml", "--run-dir", "/runs/1")
 
 
 def test_without_simulated_vehicles_there_is_no_world() -> None:

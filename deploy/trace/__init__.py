@@ -1,0 +1,1 @@
+"""What `swarmtouch trace` does, one module per action."""

@@ -1,0 +1,24 @@
+"""`swarmtouch trace report`: the paper's figures and tables of a flight."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from shared.errors import ConfigError
+
+
+def main(*, runs: Sequence[Path], output: Path) -> int:
+    """Writes the report; returns the exit code."""
+    try:
+        from observer.report.source import open_record  # noqa: PLC0415  the extra `plot`
+        from observer.report.write import write_report  # noqa: PLC0415
+    except ImportError as error:
+        raise ConfigError(
+            f"trace report needs {error.name}: install the extra, for example pip install 'swarmtouch[plot]'"
+        ) from error
+    flights = [open_record(run) for run in runs]
+    try:
+        page = write_report(flights, output)
+    except OSError as error:
+        raise ConfigError(f"-o {output}: the report cannot be written there: {error}") from error
+    print(page)
+    return 0

@@ -1,0 +1,65 @@
+"""Says again what a trace holds, byte by byte, in order and at its pace."""
+
+import threading
+from collections.abc import Iterable
+
+import attrs
+
+from observer.histogram import Histogram, Quantiles
+from observer.trace.read import Record
+from shared.clock import NS_PER_S, Clock
+from shared.topics import Delivery, topic_of
+from shared.transport import Bus, Publish
+
+PREFIX = "replay/"
+"""Before every key, unless the replay is to be taken for a live swarm."""
+
+
+@attrs.frozen
+class Replayed:
+    """What a replay did: messages said, and how much later than their moment, ms."""
+
+    messages: int
+    lateness_ms: Quantiles
+
+
+def replay(
+    records: Iterable[Record],
+    bus: Bus,
+    clock: Clock,
+    stopping: threading.Event,
+    *,
+    speed: float = 1.0,
+    prefix: str = PREFIX,
+) -> Replayed:
+    """Publishes records at the pace at which they were recorded, by the recorder's clock.
+
+    Args:
+        records: What to say.
+        bus: Where; nothing is published on it before the first record is due.
+        clock: This process's clock.
+        stopping: Ends the replay early.
+        speed: 2.0 is twice as fast.
+        prefix: What to put before every key.
+    """
+    publishers: dict[str, Publish] = {}
+    lateness, messages = Histogram(), 0
+    start_ns, first_ns = clock(), 0
+    for record in records:
+        first_ns = first_ns or record.log_ns
+        due_ns = start_ns + round((record.log_ns - first_ns) / speed)
+        if (early_ns := due_ns - clock()) > 0:
+            stopping.wait(early_ns / NS_PER_S)
+        if stopping.is_set():
+            break
+        publish = publishers.get(record.key) or _publisher(bus, prefix, record.key)
+        publishers[record.key] = publish
+        lateness.add(max(0, clock() - due_ns) / 1e6)
+        publish(record.payload)
+        messages += 1
+    return Replayed(messages, lateness.quantiles())
+
+
+def _publisher(bus: Bus, prefix: str, key: str) -> Publish:
+    # What many processes said is now said by one, in bursts that overflow the one-message queue of a state.
+    return bus.publisher(attrs.evolve(topic_of(key), pattern=prefix + key, delivery=Delivery.EVENT))
