@@ -6,6 +6,7 @@ from attrs import Attribute, Factory, field, frozen
 from attrs.validators import optional
 
 from shared.messages import MAX_DRONE_ID
+from shared.pointer_link import DEFAULT_PORT
 
 Law = Literal["paper", "stable"]
 Shape = Literal["rhombus", "triangle", "line", "vee", "grid", "custom"]
@@ -310,11 +311,13 @@ class Net:
         base_port: First port on loopback of nodes without an endpoint.
         endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "tcp/10.0.0.2:7447"`.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
+        pointer_port: Loopback UDP port where the relay's `pointer://` source hears consoles; 0: it has none.
     """
 
     base_port: int = field(default=7460, validator=_positive)
     endpoints: dict[str, str] = Factory(dict)
     adminspace: bool = False
+    pointer_port: int = field(default=DEFAULT_PORT, validator=_not_negative)
 
 
 @frozen(kw_only=True)

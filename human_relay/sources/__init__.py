@@ -9,6 +9,7 @@ from shared.errors import ConfigError
 BACKENDS = {
     "scripted": ("human_relay.sources.scripted", "ScriptedHand"),
     "recording": ("human_relay.sources.recording", "RecordedHand"),
+    "pointer": ("human_relay.sources.pointer", "PointerHand"),
 }
 
 
@@ -21,6 +22,7 @@ def open_source(uri: str, start_ns: int) -> HandSource:
 
     Raises:
         ConfigError: Unknown scheme or option, or a file that is missing or wrong.
+        DeviceError: What it listens on is in use.
     """
     parsed = parse_uri(uri)
     return _backend(parsed)(parsed, start_ns)

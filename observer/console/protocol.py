@@ -7,7 +7,7 @@ types, unknown or missing fields, non-finite numbers and oversized messages are 
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
 from attrs import frozen
@@ -148,7 +148,7 @@ def _number(value: Any, limit: float) -> float:
     return float(value)
 
 
-_READERS: dict[str, tuple[tuple[str, ...], Any]] = {
+_READERS: dict[str, tuple[tuple[str, ...], Callable[..., Request]]] = {
     "take": ((), Take),
     "release": ((), Release),
     "give": (("to",), _give),
