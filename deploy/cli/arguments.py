@@ -10,9 +10,19 @@ def add_flight_arguments(parser: argparse.ArgumentParser, *, hand: str) -> None:
         "--hand",
         metavar="URI",
         default=hand,
-        help="hand source: scripted:NAME or recording:PATH (default: %(default)s)",
+        help="hand source: scripted:NAME, recording:PATH or pointer:// (default: %(default)s)",
     )
     add_overrides(parser)
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """Declares which running swarm is meant, as `run`."""
+    parser.add_argument(
+        "run",
+        nargs="?",
+        metavar="RUN",
+        help="run directory, scenario file, or a scenario that ships (default: the newest in runs/)",
+    )
 
 
 def add_overrides(parser: argparse.ArgumentParser) -> None:

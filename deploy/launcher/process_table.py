@@ -18,6 +18,7 @@ WORLD = "world"
 DRONE = "drone"
 BRIDGE = "bridge"
 RELAY = "relay"
+CONSOLE = "console"
 
 
 @frozen(kw_only=True)
@@ -31,6 +32,22 @@ class GloveChoice:
 
     uri: str
     patterns: str
+
+
+@frozen(kw_only=True)
+class ConsoleChoice:
+    """The page in the browser.
+
+    Attributes:
+        port: TCP port on loopback.
+        pattern_file: Where the frames of the glove's patterns lie.
+        takeover: URI of the pointer by which a page may take the hand over from another source; None where the
+            hand is a pointer anyway.
+    """
+
+    port: int
+    pattern_file: Path
+    takeover: str | None
 
 
 @frozen(kw_only=True)
@@ -70,6 +87,7 @@ def process_table(
     hand: str,
     run_dir: Path,
     glove: GloveChoice | None = None,
+    console: ConsoleChoice | None = None,
     verbose: bool = False,
 ) -> tuple[ProcessRow, ...]:
     """Derives the processes of a flight on this machine, in the order in which they start.
@@ -81,11 +99,12 @@ def process_table(
         hand: URI of the hand source.
         run_dir: Directory of this run.
         glove: What the operator wears, None for nothing.
+        console: The page in the browser, None for none.
         verbose: Whether the processes log debugging details.
 
     Returns:
-        The world (if a vehicle is simulated), one agent per drone, the bridge to the glove (if there is one),
-        and the relay last: a hand may only begin to move when everybody listens.
+        The world (if a vehicle is simulated), one agent per drone, the bridge to the glove and the console (if
+        there are any), and the relay last: a hand may only begin to move when everybody listens.
     """
     common = ("--scenario", str(file), *(("-v",) if verbose else ()))
     agents = tuple(
@@ -95,17 +114,26 @@ def process_table(
     world = ProcessRow(
         role=WORLD, number=0, command=_python("agents.vehicles.world", *common, "--run-dir", str(run_dir))
     )
+    takeover = ("--takeover", console.takeover) if console and console.takeover else ()
     relay = ProcessRow(
-        role=RELAY, number=0, command=_python("human_relay", *common, "--hand", hand), takes_orders=True
+        role=RELAY,
+        number=0,
+        command=_python("human_relay", *common, "--hand", hand, *takeover),
+        takes_orders=True,
     )
     worn = ("--glove", glove.uri, "--patterns", glove.patterns) if glove else ()
     bridge = ProcessRow(role=BRIDGE, number=0, command=_python("glove_bridge", *common, *worn))
     simulated = any((vehicle_settings(scenario, i).uri or "").startswith("sim:") for i in formation.ids)
-    return (*((world,) if simulated else ()), *agents, *((bridge,) if glove else ()), relay)
+    page = (_console_row(console, common),) if console else ()
+    return (*((world,) if simulated else ()), *agents, *((bridge,) if glove else ()), *page, relay)
 
 
 def resolve_scenario(
-    scenario: Scenario, formation: Formation, tcp_ports: Sequence[int], udp_port: int
+    scenario: Scenario,
+    formation: Formation,
+    tcp_ports: Sequence[int],
+    udp_port: int,
+    pointer_port: int = 0,
 ) -> Scenario:
     """Fills in the addresses that the scenario leaves open.
 
@@ -114,6 +142,7 @@ def resolve_scenario(
         formation: Its formation.
         tcp_ports: A free port on loopback for every node of `all_nodes(formation)`.
         udp_port: A free port on loopback for the simulated world.
+        pointer_port: Port of the relay's pointer, 0 if it has none.
 
     Returns:
         The scenario with an endpoint for every node and an address for the vehicles; what it names stays.
@@ -123,7 +152,7 @@ def resolve_scenario(
     uri = everyone.uri or f"sim://127.0.0.1:{udp_port}/{{id}}"
     return attrs.evolve(
         scenario,
-        net=attrs.evolve(scenario.net, endpoints={**free, **scenario.net.endpoints}),
+        net=attrs.evolve(scenario.net, endpoints={**free, **scenario.net.endpoints}, pointer_port=pointer_port),
         vehicles=attrs.evolve(scenario.vehicles, all=attrs.evolve(everyone, uri=uri)),
     )
 
@@ -138,6 +167,11 @@ def hint_overrides(hints: Mapping[str, Any]) -> list[str]:
         `key=value` items for `load_scenario`.
     """
     return [f"{key}={_toml(value)}" for key, value in hints.items()]
+
+
+def _console_row(console: ConsoleChoice, common: tuple[str, ...]) -> ProcessRow:
+    where = ("--port", str(console.port), "--patterns", str(console.pattern_file))
+    return ProcessRow(role=CONSOLE, number=0, command=_python("observer.console", *common, *where))
 
 
 def _toml(value: Any) -> str:

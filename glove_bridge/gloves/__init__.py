@@ -11,6 +11,7 @@ BACKENDS = {
     "none": ("glove_bridge.gloves.absent", "AbsentGlove"),
     "terminal": ("glove_bridge.gloves.terminal", "TerminalGlove"),
     "record": ("glove_bridge.gloves.record", "RecordGlove"),
+    "screen": ("glove_bridge.gloves.screen", "ScreenGlove"),
 }
 """Scheme -> module and class; the class is called with what follows `scheme://`."""
 

@@ -37,7 +37,7 @@ class PointerHand:
             ConfigError: Unknown option, a value out of range, or an address that is not on loopback.
             DeviceError: The port is in use.
         """
-        host, port = _address(uri)
+        host, port = pointer_address(uri)
         self._limits = _limits(uri)
         self._state = PointerState(moved_ns=start_ns)
         self._due_ns = start_ns
@@ -53,7 +53,7 @@ class PointerHand:
     @staticmethod
     def hints(uri: SourceUri) -> dict[str, object]:
         """A pointer points in the world frame: it says nothing about the mapping."""
-        _address(uri)
+        pointer_address(uri)
         _limits(uri)
         return {}
 
@@ -122,7 +122,12 @@ def _limits(uri: SourceUri) -> Limits:
     )
 
 
-def _address(uri: SourceUri) -> tuple[str, int]:
+def pointer_address(uri: SourceUri) -> tuple[str, int]:
+    """Returns host and port that a pointer listens on.
+
+    Raises:
+        ConfigError: It is no IPv4 address on loopback.
+    """
     try:
         parts = urlsplit(f"//{uri.path}")
         host, port = parts.hostname or LOOPBACK, DEFAULT_PORT if parts.port is None else parts.port

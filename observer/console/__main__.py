@@ -4,11 +4,11 @@ import argparse
 import sys
 from pathlib import Path
 
+from observer.console.arguments import add_console_arguments
 from observer.console.console import ROLE
-from observer.console.serve import PORT, RANDOM_TOKEN, TOKEN_VARIABLE, Options, serve
+from observer.console.serve import Options, serve
 from shared.config import load_scenario
 from shared.errors import SwarmTouchError
-from shared.pointer_link import LOOPBACK
 from shared.process import add_process_arguments, explain, prepare_process
 
 _EXAMPLE = "example: python -m observer.console --scenario runs/latest/scenario.toml"
@@ -31,20 +31,6 @@ def main() -> int:
     except SwarmTouchError as error:
         return explain(ROLE, error)
     return 0
-
-
-def add_console_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares where and how to serve."""
-    parser.add_argument("--host", default=LOOPBACK, help="address to bind; others want a token (%(default)s)")
-    parser.add_argument("--port", type=int, default=PORT, help="TCP port, 0 for any free one (%(default)s)")
-    parser.add_argument(
-        "--token",
-        metavar="CHOICE",
-        help=f"{RANDOM_TOKEN} or @FILE: what a page must know (default: {TOKEN_VARIABLE}, or nothing)",
-    )
-    parser.add_argument(
-        "--tls", type=Path, metavar="DIR", help="HTTPS with DIR/cert.pem and key.pem, made if they are missing"
-    )
 
 
 def _parse() -> argparse.Namespace:

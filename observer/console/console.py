@@ -76,7 +76,7 @@ class Console:
         self._links: dict[int, PageLink] = {}
         self._opened = 0
         self._control: Json = {}
-        self._notices: Json = {}
+        self._notices = view.notices(clock())
         self._health_ns = self._notice_ns = self._pointed_ns = 0
 
     @property

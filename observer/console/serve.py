@@ -14,8 +14,10 @@ from typing import Any
 import uvicorn
 from attrs import frozen
 
+from observer.console import PORT
 from observer.console.access import is_loopback
 from observer.console.app import make_app
+from observer.console.arguments import RANDOM_TOKEN, TOKEN_VARIABLE
 from observer.console.console import Console, run
 from observer.console.pattern_file import NO_PATTERNS, Patterns, read_patterns
 from observer.console.protocol import MAX_MESSAGE
@@ -31,9 +33,6 @@ from shared.pointer_link import LOOPBACK
 from shared.scenario import Scenario
 from shared.transport import Inbox
 
-PORT = 8460
-TOKEN_VARIABLE = "SWARMTOUCH_CONSOLE_TOKEN"  # noqa: S105  the name of a variable, no token
-RANDOM_TOKEN = "random"  # noqa: S105  a word, no token
 SHORTEST_TOKEN = 8
 _DEPTH = 64
 _PING_S = 5.0

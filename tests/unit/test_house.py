@@ -16,7 +16,7 @@ PURE = [
     *sorted((ROOT / "agents/vehicles/bodies").glob("*.py")),
     *(ROOT / f"agents/{name}.py" for name in ("agent", "settings", "stepping")),
     ROOT / "agents/vehicles/world/referee.py",
-    *(ROOT / f"human_relay/{name}.py" for name in ("velocity", "relay")),
+    *(ROOT / f"human_relay/{name}.py" for name in ("velocity", "relay", "pointing")),
     *(
         ROOT / f"glove_bridge/{name}.py"
         for name in ("formation_state", "meaning", "cues", "scheduler", "swarm_view", "distinctiveness")
@@ -24,6 +24,8 @@ PURE = [
     *sorted((ROOT / "glove_bridge/rules").glob("*.py")),
     *(ROOT / f"glove_bridge/patterns/{name}.py" for name in ("pattern", "schema")),
     *(ROOT / f"observer/{name}.py" for name in ("flight_stats", "agent_log", "hand_log", "histogram")),
+    *(ROOT / f"observer/console/{name}.py" for name in ("access", "notices", "ownership", "protocol", "scene")),
+    ROOT / "deploy/status/report.py",
     *(
         ROOT / f"shared/{name}.py"
         for name in (
@@ -33,6 +35,7 @@ PURE = [
             "geometry",
             "messages",
             "nodes",
+            "pointer_link",
             "scenario",
             "shapes",
             "topics",
@@ -118,6 +121,7 @@ def loaded_by(module: str) -> set[str]:
 def test_a_flying_process_loads_nothing_heavy(module: str) -> None:
     loaded = loaded_by(module)
     heavy = {"rich", "rosbags", "matplotlib", "scipy", "cryptography", "mcap", "websockets", "http", "asyncio"}
+    heavy |= {"starlette", "uvicorn"}
     assert loaded & heavy == set()
     assert {"zenoh", "numpy"} <= loaded
 
