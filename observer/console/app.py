@@ -1,6 +1,7 @@
 """The web application: the page's files, its WebSocket, and who is let in."""
 
 import asyncio
+import contextlib
 import socket
 from http.cookies import SimpleCookie
 from pathlib import Path
@@ -59,7 +60,7 @@ async def _serve_page(websocket: WebSocket, console: Console) -> None:
         return
     link = console.open()
     tasks = [
-        asyncio.create_task(link.run(websocket.send_text)),
+        asyncio.create_task(_tell(websocket, link)),
         asyncio.create_task(_listen(websocket, console, link)),
     ]
     try:
@@ -68,9 +69,12 @@ async def _serve_page(websocket: WebSocket, console: Console) -> None:
         console.close(link)
         for task in tasks:
             task.cancel()
-        for result in await asyncio.gather(*tasks, return_exceptions=True):
-            if isinstance(result, Exception) and not isinstance(result, WebSocketDisconnect):
-                raise result
+
+
+async def _tell(websocket: WebSocket, link: PageLink) -> None:
+    with contextlib.suppress(WebSocketDisconnect):
+        await link.run(websocket.send_text)
+        await websocket.close(_TRY_AGAIN_LATER, "this page does not read what it is told")
 
 
 async def _listen(websocket: WebSocket, console: Console, link: PageLink) -> None:

@@ -34,7 +34,7 @@ M = TypeVar("M", bound=Message)
 Frames = Mapping[str, Sequence[Json]]
 """Pattern name -> frames `{ms, hz: {finger: Hz}}`."""
 
-OWN_TOKEN = "console/0"
+MYSELF = "console/0"
 """A process does not hear itself; of another console only that it is there would be known."""
 _AIRBORNE = frozenset({Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND})
 _WORLD = "world"
@@ -99,7 +99,7 @@ class SwarmView:
 
     def presence_changed(self, token: str, present: bool) -> None:
         """Takes in that a process came or left; called on the bus's thread: single set operations only."""
-        if present and token != OWN_TOKEN:
+        if present and token != MYSELF:
             self.present.add(token)
         else:
             self.present.discard(token)
