@@ -26,7 +26,7 @@ export class HandFigure {
     const drawing = shape("svg", { viewBox: "0 -8 206 200", role: "img", "aria-label": "Right hand, seen from its back" });
     const edges = LIMBS.map(({ from, tip }) => limb("finger-edge", from, tip));
     const limbs = LIMBS.map(({ from, tip }) => limb("finger-limb", from, tip));
-    const palm = "M72 106Q118 82 170 116L167 146Q164 172 150 190L92 190Q90 176 78 164L66 146Z";
+    const palm = "M72 106Q118 82 171 123C170 150 164 168 152 190L92 190Q82 170 65 156Z";
     drawing.append(...edges, shape("path", { class: "hand-shape", d: palm }), ...limbs);
     for (const { finger, tip } of LIMBS) {
       drawing.append(this.#fingertip(finger, tip));

@@ -9,6 +9,8 @@ import { part, write } from "../dom.js";
 export class ControlPanel {
   #model;
   #send;
+  /** Who has been told no: that page must ask anew to be shown again. @type {number | undefined} */
+  #refused;
 
   /** @param {Model} model @param {(message: object) => void} send */
   constructor(model, send) {
@@ -16,10 +18,15 @@ export class ControlPanel {
     this.#send = send;
     part("take").addEventListener("click", () => send({ type: this.#releases ? "release" : "take" }));
     part("give").addEventListener("click", () => send({ type: "give", to: model.asking[0] }));
-    part("keep").addEventListener("click", () => (part("asked").hidden = true));
+    part("keep").addEventListener("click", () => this.#keep());
     for (const button of orderButtons()) {
       button.addEventListener("click", () => this.order(button.dataset.order ?? ""));
     }
+  }
+
+  #keep() {
+    this.#refused = this.#model.asking[0];
+    this.show(true);
   }
 
   /** Says what the operator wants, and takes the hand for it if it is free. @param {string} wish */
@@ -54,7 +61,8 @@ export class ControlPanel {
     write(part("take"), this.#takeText());
     button("take").disabled = !steers;
     part("take").classList.toggle("primary", !mine);
-    part("asked").hidden = !mine || asking.length === 0;
+    this.#refused = asking.find((page) => page === this.#refused);
+    part("asked").hidden = !mine || asking.length === 0 || asking[0] === this.#refused;
     for (const one of orderButtons()) {
       const stop = one.dataset.order === "STOP";
       one.disabled = !steers || !(mine || holder === null || stop);

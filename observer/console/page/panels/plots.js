@@ -9,7 +9,7 @@ import { readPalette } from "../view/palette.js";
 
 const SPAN_S = 20;
 const SAMPLE_S = 0.1;
-const HEIGHT_PX = 66;
+const HEIGHT_PX = 70;
 
 /** @type {{name: string, unit: string, least: number, digits: number, of: (model: Model) => number | null}[]} */
 const PLOTS = [
@@ -102,7 +102,7 @@ function chart(box, least) {
       height: HEIGHT_PX,
       legend: { show: false },
       cursor: { show: false },
-      padding: [6, 0, 7, 0],
+      padding: [10, 0, 7, 0],
       scales: { x: { time: false, range: [-SPAN_S, 0] }, y: { range: (_, __, high) => [0, Math.max(least, high ?? 0)] } },
       axes: [
         { show: false },
