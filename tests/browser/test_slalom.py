@@ -2,6 +2,7 @@
 
 import math
 import time
+from functools import partial
 from pathlib import Path
 
 from playwright.sync_api import Browser
@@ -29,7 +30,7 @@ def test_a_visitor_flies_the_slalom_within_a_minute(browser: Browser, tmp_path: 
                 pilot.page.wait_for_timeout(900)
                 PICTURES.mkdir(parents=True, exist_ok=True)
                 pilot.page.screenshot(path=PICTURES / "console.png")
-            pilot.until(lambda x=x, y=y: settled(pilot, x, y))
+            pilot.until(partial(settled, pilot, x, y))
         assert all(drone["position"][0] < BEHIND_THE_LAST_ROW for drone in pilot.told("snapshot")["drones"])
         assert time.monotonic() - start < A_MINUTE_S
         referee = pilot.told("health")["referee"]
