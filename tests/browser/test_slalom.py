@@ -7,8 +7,9 @@ from pathlib import Path
 
 from playwright.sync_api import Browser
 
+from shared.messages import Mode
 from tests.browser.flight import console_flight
-from tests.browser.pilot import Pilot
+from tests.browser.pilot import PATIENCE_S, Pilot
 from tests.browser.test_layout import PICTURES
 
 # Through the middle of each gate, and sideways between the rows of columns.
@@ -39,6 +40,20 @@ def test_a_visitor_flies_the_slalom_within_a_minute(browser: Browser, tmp_path: 
         pilot.until_mode("GROUND")
         pilot.close()
         assert pilot.errors == []
+
+
+def test_space_stops_every_motor_from_any_page(browser: Browser, tmp_path: Path) -> None:
+    with console_flight("rhombus", tmp_path) as flight:
+        flying, watching = Pilot(browser, flight.url), Pilot(browser, flight.url)
+        flying.take_off()
+        watching.page.focus("#sound")
+        watching.page.keyboard.press("Space")
+        flight.recorder.until(lambda: flight.recorder.all_in(Mode.STOP), PATIENCE_S)
+        flying.until(lambda: flying.text("#swarm-state") == "stopped")
+        assert watching.page.get_attribute("#sound", "aria-pressed") == "false"
+        for pilot in (flying, watching):
+            pilot.close()
+            assert pilot.errors == []
 
 
 def settled(pilot: Pilot, x: float, y: float) -> bool:

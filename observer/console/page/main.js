@@ -10,7 +10,7 @@ import { Tilt } from "./hand/tilt.js";
 import { Model } from "./model.js";
 import { ControlPanel } from "./panels/control.js";
 import { GlovePanel, showNotices, toggle } from "./panels/glove.js";
-import { showHealth } from "./panels/health.js";
+import { showHealth, showReferee } from "./panels/health.js";
 import { Plots } from "./panels/plots.js";
 import { followTheme } from "./panels/theme.js";
 import { describe } from "./panels/words.js";
@@ -49,7 +49,8 @@ function receive(message) {
     case "notices":
       return showNotices(message.notices);
     case "health":
-      return showHealth(message.processes);
+      showHealth(message.processes);
+      return showReferee(message.referee);
     case "refused":
       return write(part("hand-state"), message.why);
   }

@@ -23,7 +23,8 @@ export class HandFigure {
 
   /** @param {Element} parent where the drawing goes */
   constructor(parent) {
-    const drawing = shape("svg", { viewBox: "0 -8 206 200", role: "img", "aria-label": "Right hand, seen from its back" });
+    const name = "Right hand, seen from its back";
+    const drawing = shape("svg", { viewBox: "0 -8 206 200", role: "img", "aria-label": name });
     const edges = LIMBS.map(({ from, tip }) => limb("finger-edge", from, tip));
     const limbs = LIMBS.map(({ from, tip }) => limb("finger-limb", from, tip));
     const palm = "M72 106Q118 82 171 123C170 150 164 168 152 190L92 190Q82 170 65 156Z";

@@ -5,6 +5,13 @@ import { part, write } from "../dom.js";
 
 /** @typedef {import("../model.js").Model} Model */
 
+/** @type {Record<string, string>} wish of the console's hand -> what its holder may do */
+const ADVICE = {
+  GROUND: "Take off when you are ready",
+  HOLD: "Holding: press Fly to go on",
+  STOP: "Motors stopped: start a new flight",
+};
+
 /** The card of the hand; what its buttons say goes to `send`. */
 export class ControlPanel {
   #model;
@@ -113,7 +120,7 @@ export class ControlPanel {
     if (!mine) {
       return holder === null ? "Drag here to take the hand" : "";
     }
-    return { GROUND: "Take off when you are ready", HOLD: "Holding: Fly to go on", STOP: "Motors stopped" }[wish] ?? "";
+    return ADVICE[wish] ?? "";
   }
 }
 

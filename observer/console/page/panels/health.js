@@ -19,6 +19,17 @@ export function showHealth(processes) {
   write(part("health-sum"), ailing.length ? `${all - ailing.length} of ${all} well` : `all ${all} well`);
 }
 
+/**
+ * Shows what the simulated world has seen, whatever the drones believe; nothing where the world is real.
+ * @param {Record<string, number>} referee
+ */
+export function showReferee({ collisions, min_distance_m }) {
+  const apart = min_distance_m === undefined ? "" : `, drones at least ${min_distance_m.toFixed(2)} m apart`;
+  const hits = collisions === 1 ? "1 collision" : `${collisions} collisions`;
+  write(part("referee"), collisions === undefined ? "" : `${hits}${apart}`);
+  part("referee").dataset.tone = collisions > 0 ? "danger" : "";
+}
+
 /** @param {Process} process @returns {HTMLElement} */
 function row(process) {
   const { word, tone } = condition(process);

@@ -4,12 +4,14 @@ import { flies } from "../model.js";
 import { make } from "../dom.js";
 import { readPalette } from "../view/palette.js";
 
-/* global uPlot */
 /** @typedef {import("../model.js").Model} Model */
+
+const { uPlot } = /** @type {any} */ (globalThis);
 
 const SPAN_S = 20;
 const SAMPLE_S = 0.1;
 const HEIGHT_PX = 70;
+const AXIS = { size: 34, gap: 4, space: 24, font: "11px Inter, system-ui, sans-serif", ticks: { show: false } };
 
 /** @type {{name: string, unit: string, least: number, digits: number, of: (model: Model) => number | null}[]} */
 const PLOTS = [
@@ -92,10 +94,15 @@ function frame(parent, { name }) {
   return { box, value, chart: null };
 }
 
+/** @param {number} least upper end of the scale at least
+ * @returns {(chart: unknown, low: number | null, high: number | null) => [number, number]} */
+function upTo(least) {
+  return (_chart, _low, high) => [0, Math.max(least, high ?? 0)];
+}
+
 /** @param {HTMLElement} box @param {number} least upper end of the scale at least */
 function chart(box, least) {
   const palette = readPalette();
-  const rule = { stroke: palette.line, width: 1 };
   return new uPlot(
     {
       width: Math.max(box.clientWidth, 1),
@@ -103,11 +110,8 @@ function chart(box, least) {
       legend: { show: false },
       cursor: { show: false },
       padding: [10, 0, 7, 0],
-      scales: { x: { time: false, range: [-SPAN_S, 0] }, y: { range: (_, __, high) => [0, Math.max(least, high ?? 0)] } },
-      axes: [
-        { show: false },
-        { size: 34, gap: 4, space: 24, stroke: palette.soft, font: "11px Inter, system-ui, sans-serif", grid: rule, ticks: { show: false } },
-      ],
+      scales: { x: { time: false, range: [-SPAN_S, 0] }, y: { range: upTo(least) } },
+      axes: [{ show: false }, { ...AXIS, stroke: palette.soft, grid: { stroke: palette.line, width: 1 } }],
       series: [{}, { stroke: palette.accent, width: 1.5, points: { show: false } }],
     },
     [[], []],

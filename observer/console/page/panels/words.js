@@ -17,8 +17,12 @@ export function describe(model, bare) {
   if (bare) {
     return hand;
   }
-  const drones = snapshot.drones.map(({ id, mode, position }) => `Drone ${id}: ${mode.toLowerCase()}, ${place(position)}.`);
-  return [hand, ...drones].join(" ");
+  return [hand, ...snapshot.drones.map(sentence)].join(" ");
+}
+
+/** @param {import("../model.js").Drone} drone @returns {string} */
+function sentence({ id, mode, position }) {
+  return `Drone ${id}: ${mode.toLowerCase()}, ${place(position)}.`;
 }
 
 /** @param {readonly number[]} point @returns {string} as the operator looks: along -x, +y is right */
