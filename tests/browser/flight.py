@@ -54,10 +54,10 @@ def console_flight(scenario: str, runs: Path, *overrides: str) -> Iterator[Conso
 
 
 @contextmanager
-def another_console(flight: ConsoleFlight, folder: Path, *arguments: str) -> Iterator[str]:
-    """Starts one more console for a flight; gives its address."""
+def another_console(scenario: Path, folder: Path, *arguments: str) -> Iterator[str]:
+    """Starts a console for a resolved scenario; gives its address."""
     log = folder / "another-console.log"
-    command = [sys.executable, "-m", "observer.console", "--scenario", str(flight.file), "--port", "0"]
+    command = [sys.executable, "-m", "observer.console", "--scenario", str(scenario), "--port", "0"]
     with log.open("wb") as output:
         process = subprocess.Popen([*command, *arguments], stdout=output, stderr=output)
     try:

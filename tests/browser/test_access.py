@@ -16,7 +16,7 @@ def test_the_token_is_refused_and_accepted(
 ) -> None:
     file = tmp_path / "token"
     file.write_text(TOKEN)
-    with another_console(flight, tmp_path, "--token", f"@{file}") as url:
+    with another_console(flight.file, tmp_path, "--token", f"@{file}") as url:
         bare, _, _ = url.partition("?")
         context = browser.new_context()
         page = context.new_page()
@@ -36,13 +36,13 @@ def test_the_token_is_refused_and_accepted(
 def test_the_page_comes_back_to_a_console_that_comes_back(
     open_pilot: OpenPilot, flight: ConsoleFlight, tmp_path: Path
 ) -> None:
-    with another_console(flight, tmp_path) as url:
+    with another_console(flight.file, tmp_path) as url:
         pilot = open_pilot(url)
         pilot.told("snapshot")
     pilot.until(lambda: pilot.text("#swarm-state") == "no connection")
     assert "Connection lost" in pilot.text("#coach")
     port = url.rstrip("/").rpartition(":")[2]
-    with another_console(flight, tmp_path, "--port", port):
+    with another_console(flight.file, tmp_path, "--port", port):
         pilot.until(lambda: pilot.text("#swarm-state") != "no connection")
         pilot.press("Take the hand")
         pilot.until(lambda: pilot.text("#hand-state") == "you hold it")

@@ -24,7 +24,7 @@ export function showHealth(processes) {
  * @param {Record<string, number>} referee
  */
 export function showReferee({ collisions, min_distance_m }) {
-  const apart = min_distance_m === undefined ? "" : `, drones at least ${min_distance_m.toFixed(2)} m apart`;
+  const apart = min_distance_m === undefined ? "" : `, at least ${min_distance_m.toFixed(2)} m apart`;
   const hits = collisions === 1 ? "1 collision" : `${collisions} collisions`;
   write(part("referee"), collisions === undefined ? "" : `${hits}${apart}`);
   part("referee").dataset.tone = collisions > 0 ? "danger" : "";
