@@ -110,11 +110,12 @@ def parse(text: str | bytes) -> Request:
 
 
 def _rounded(value: Any) -> Any:
-    if isinstance(value, float):
+    kind = type(value)
+    if kind is float:
         return round(value, 3)
-    if isinstance(value, Mapping):
+    if kind is dict:
         return {key: _rounded(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
+    if kind is list or kind is tuple:
         return [_rounded(item) for item in value]
     return value
 
