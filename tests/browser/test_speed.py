@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Browser
 
 from deploy.launcher.ports import free_ports
@@ -26,8 +27,9 @@ MEASURE = """(seconds) => new Promise((done) => {
     requestAnimationFrame(frame);
 })"""
 SECONDS = 3
-LEAST_HZ = 20.0
-"""Far below what a machine with a core to spare shows: this one may be busy with the rest of the swarm."""
+LEAST_HZ = 30.0
+LEAST_BUSY_HZ = 10.0
+"""Where the flight's own processes compete with the browser, which draws without a GPU, for two cores."""
 
 
 def frames_per_second(pilot: Pilot, drones: int) -> float:
@@ -37,20 +39,21 @@ def frames_per_second(pilot: Pilot, drones: int) -> float:
     return float(rate_hz)
 
 
-def test_the_page_keeps_up_with_eight_drones(browser: Browser, tmp_path: Path) -> None:
+def test_the_page_keeps_up_with_a_flight_of_eight(browser: Browser, tmp_path: Path) -> None:
     with console_flight("grid", tmp_path, "formation.n=8") as flight:
         pilot = Pilot(browser, flight.url)
         pilot.take_off()
         x, y, _ = pilot.hand()
         pilot.drag_hand(x - 1.0, y + 0.5)
-        assert frames_per_second(pilot, 8) >= LEAST_HZ
+        assert frames_per_second(pilot, 8) >= LEAST_BUSY_HZ
         pilot.until(lambda: abs(pilot.hand()[1] - y - 0.5) < 0.1)
         pilot.close()
         assert pilot.errors == []
 
 
-def test_thirty_two_drones_are_still_usable(browser: Browser, tmp_path: Path) -> None:
-    raw = load_scenario("grid", ["formation.n=32"])
+@pytest.mark.parametrize("drones", [8, 32])
+def test_the_page_itself_draws_many_drones(browser: Browser, tmp_path: Path, drones: int) -> None:
+    raw = load_scenario("grid", [f"formation.n={drones}"])
     formation = build_formation(raw)
     tcp, (udp, pointer) = free_ports(tcp=len(all_nodes(formation)), udp=2)
     file = tmp_path / "scenario.toml"
@@ -59,10 +62,10 @@ def test_thirty_two_drones_are_still_usable(browser: Browser, tmp_path: Path) ->
     try:
         with another_console(file, tmp_path) as url:
             pilot = Pilot(browser, url)
-            pilot.until(lambda: pilot.text("#swarm-state") == "32 following")
+            pilot.until(lambda: pilot.text("#swarm-state") == f"{drones} following")
             pilot.press("Take the hand")
             pilot.until(lambda: pilot.text("#hand-state") == "you hold it")
-            assert frames_per_second(pilot, 32) >= LEAST_HZ
+            assert frames_per_second(pilot, drones) >= LEAST_HZ
             pilot.close()
             assert pilot.errors == []
     finally:

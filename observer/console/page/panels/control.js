@@ -118,7 +118,7 @@ export class ControlPanel {
       return "";
     }
     if (!mine) {
-      return holder === null ? "Drag here to take the hand" : "";
+      return holder !== null ? "" : airborne(this.#model) ? "Drag here to take the hand" : "Press Take off to fly";
     }
     return ADVICE[wish] ?? "";
   }
@@ -147,7 +147,7 @@ function swarmState({ scene, snapshot }) {
       return { word, tone: "care" };
     }
   }
-  return count("FOLLOW") ? { word: `${count("FOLLOW")} following`, tone: "good" } : { word: "on the ground", tone: "" };
+  return count("FOLLOW") ? { word: `${count("FOLLOW")} following`, tone: "good" } : { word: "landed", tone: "" };
 }
 
 /** @returns {NodeListOf<HTMLButtonElement>} */

@@ -144,7 +144,7 @@ function drawDrone(pen, [x, y], drone, radius, palette) {
     pen.textBaseline = "middle";
     pen.fillText(String(drone.id), x, y + 0.5);
   }
-  if (drone.flags.some((flag) => WARNING_FLAGS.has(flag))) {
+  if (flies(drone) && drone.flags.some((flag) => WARNING_FLAGS.has(flag))) {
     pen.strokeStyle = palette.care;
     pen.lineWidth = 2;
     ring(pen, x, y, radius * 1.5);
