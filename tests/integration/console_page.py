@@ -103,13 +103,14 @@ class Page:
 def open_page(port: int, limit_s: float = OPEN_S) -> Iterator[Page]:
     """Opens a page as soon as the console answers, and closes it for sure."""
     deadline = time.monotonic() + limit_s
-    while True:
-        try:
-            connection = connect(f"ws://127.0.0.1:{port}/ws", compression=None)
-            break
-        except OSError:
-            assert time.monotonic() < deadline, f"no console on port {port} within {limit_s} s"
-            time.sleep(0.05)
-    with Page(connection) as page:
+    with contextlib.ExitStack() as stack:
+        while True:
+            try:
+                connection = stack.enter_context(connect(f"ws://127.0.0.1:{port}/ws", compression=None))
+                break
+            except OSError:
+                assert time.monotonic() < deadline, f"no console on port {port} within {limit_s} s"
+                time.sleep(0.05)
+        page = stack.enter_context(Page(connection))
         page.until(lambda: "snapshot" in page.newest, limit_s)
         yield page
