@@ -8,6 +8,8 @@ from attrs.validators import optional
 from shared.messages import MAX_DRONE_ID
 from shared.pointer_link import DEFAULT_PORT
 
+MAX_PORT = 65_535
+
 Law = Literal["paper", "stable"]
 Shape = Literal["rhombus", "triangle", "line", "vee", "grid", "custom"]
 
@@ -20,6 +22,11 @@ def _positive(_: Any, attribute: "Attribute[Any]", value: float) -> None:
 def _not_negative(_: Any, attribute: "Attribute[Any]", value: float) -> None:
     if not value >= 0:
         raise ValueError(f"{attribute.name} must be >= 0, not {value!r}")
+
+
+def _port(_: Any, attribute: "Attribute[Any]", value: int) -> None:
+    if not 0 <= value <= MAX_PORT:
+        raise ValueError(f"{attribute.name} must be a port from 0 to {MAX_PORT}, not {value!r}")
 
 
 def _check_box(low: "Triple | Pair", high: "Triple | Pair") -> None:
@@ -317,7 +324,7 @@ class Net:
     base_port: int = field(default=7460, validator=_positive)
     endpoints: dict[str, str] = Factory(dict)
     adminspace: bool = False
-    pointer_port: int = field(default=DEFAULT_PORT, validator=_not_negative)
+    pointer_port: int = field(default=DEFAULT_PORT, validator=_port)
 
 
 @frozen(kw_only=True)

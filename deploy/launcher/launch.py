@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 from pathlib import Path
 
 from attrs import frozen
@@ -27,6 +28,7 @@ from deploy.launcher.summary import Json, flight_summary, print_summary
 from glove_bridge.patterns import load_patterns
 from human_relay.sources import source_hints
 from observer.console import PORT
+from observer.console.arguments import TOKEN_VARIABLE
 from observer.console.pattern_file import PATTERN_FILE
 from shared.bus import ZenohBus
 from shared.clock import system_clock
@@ -139,7 +141,7 @@ async def _fly(
         StatusView(console, run_dir, live=live, panel=panel) as view,
     ):
         if page:
-            view.event(f"fly it in the browser: http://{LOOPBACK}:{page.port}/")
+            view.event(f"fly it in the browser: {_page_address(page.port)}")
         monitor = Monitor(bus, formation, system_clock())
         flight = Flight(
             formation=formation,
@@ -155,6 +157,11 @@ async def _fly(
 
 def _console_choice(hand: HandChoice, run_dir: Path) -> ConsoleChoice:
     return ConsoleChoice(port=free_port_near(PORT), pattern_file=run_dir / PATTERN_FILE, takeover=hand.takeover)
+
+
+def _page_address(port: int) -> str:
+    wanted = f"?token= and what {TOKEN_VARIABLE} says" if os.environ.get(TOKEN_VARIABLE) else ""
+    return f"http://{LOOPBACK}:{port}/{wanted}"
 
 
 def _refusal(outcome: Outcome, run_dir: Path) -> str:

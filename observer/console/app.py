@@ -97,7 +97,8 @@ class Guard:
     def __init__(self, app: ASGIApp, token: str | None) -> None:
         self._app = app
         self._token = token
-        self._names = {socket.gethostname().lower(), socket.getfqdn().lower()}
+        name = socket.gethostname().lower()
+        self._names = {name, name.partition(".")[0]}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or answers it."""

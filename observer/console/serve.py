@@ -30,6 +30,7 @@ from shared.errors import ConfigError, DeviceError
 from shared.formation import build_formation
 from shared.nodes import OBSERVER, dials, endpoint
 from shared.pointer_link import LOOPBACK
+from shared.process import LAUNCHER_PID
 from shared.scenario import Scenario
 from shared.transport import Inbox
 
@@ -76,7 +77,9 @@ def serve(options: Options, stopping: threading.Event) -> None:
     patterns = read_patterns(options.patterns) if options.patterns else NO_PATTERNS
     with _listening(options.host, options.port) as listener, _pointer(options.scenario) as pointer:
         # Answered on standard output for people and for programs that start a console.
-        print(f"console | {_address(options, listener, token)}", flush=True)
+        # Under a launcher that is a log file, and logs keep no secrets.
+        shown = None if LAUNCHER_PID in os.environ else token
+        print(f"console | {_address(options, listener, shown)}", flush=True)
         asyncio.run(_serve(options, patterns, listener, pointer, token, pair, stopping))
 
 
