@@ -47,3 +47,12 @@ def test_the_page_comes_back_to_a_console_that_comes_back(
         pilot.press("Take the hand")
         pilot.until(lambda: pilot.text("#hand-state") == "you hold it")
     pilot.errors = [error for error in pilot.errors if "ERR_CONNECTION_REFUSED" not in error]
+
+
+def test_the_page_flies_over_https(open_pilot: OpenPilot, flight: ConsoleFlight, tmp_path: Path) -> None:
+    with another_console(flight.file, tmp_path, "--tls", str(tmp_path / "tls")) as url:
+        assert url.startswith("https://")
+        pilot = open_pilot(url)
+        pilot.press("Take the hand")
+        pilot.until(lambda: pilot.text("#hand-state") == "you hold it")
+        pilot.close()

@@ -17,7 +17,7 @@ export class Tilt {
   /** @returns {string} why there is none, empty if there may be */
   static get missing() {
     if (!window.isSecureContext) {
-      return "needs HTTPS: swarmtouch console --tls";
+      return "needs HTTPS (--tls)";
     }
     return "DeviceOrientationEvent" in window ? "" : "not on this device";
   }
