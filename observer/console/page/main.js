@@ -20,6 +20,7 @@ import { Views } from "./view/views.js";
 const REPEAT_MS = 200;
 const LONGEST_FRAME_S = 0.1;
 const WORDS_MS = 1000;
+const REFUSAL_MS = 3000;
 
 const model = new Model();
 const steering = new Steering();
@@ -52,7 +53,7 @@ function receive(message) {
       showHealth(message.processes);
       return showReferee(message.referee);
     case "refused":
-      return write(part("hand-state"), message.why);
+      return disobeyed(message.why);
   }
 }
 
@@ -85,6 +86,14 @@ function connectionChanged(open) {
     controlChanged({ holder: null, asking: [], wish: model.wish });
   }
   control.show(open);
+}
+
+/** Whoever has just lost the hand need not hear that its last move came too late. @param {string} why */
+function disobeyed(why) {
+  if (model.mine) {
+    write(part("hand-state"), why);
+    setTimeout(() => control.show(connection.open), REFUSAL_MS);
+  }
 }
 
 /** There is a console, but it does not let this page in. */
