@@ -21,13 +21,11 @@ class Page:
     Attributes:
         newest: Newest message of each type.
         counts: How many messages of each type have come.
-        everything: Every message that is no snapshot, in order.
     """
 
     def __init__(self, connection: ClientConnection) -> None:
         self.newest: dict[str, dict[str, Any]] = {}
         self.counts: Counter[str] = Counter()
-        self.everything: list[dict[str, Any]] = []
         self._connection = connection
         self._point: list[float] | None = None
         self._closed = threading.Event()
@@ -43,10 +41,6 @@ class Page:
         """Points somewhere, now and repeatedly."""
         self._point = [x, y, z]
         self.say(type="hand", point=self._point, yaw=0.0)
-
-    def rest(self) -> None:
-        """Says no more where it points."""
-        self._point = None
 
     def until(self, condition: Callable[[], object], limit_s: float) -> float:
         """Waits until it holds; returns how long that took, s."""
@@ -84,8 +78,6 @@ class Page:
                 message = json.loads(text)
                 self.newest[message["type"]] = message
                 self.counts[message["type"]] += 1
-                if message["type"] != "snapshot":
-                    self.everything.append(message)
         except ConnectionClosed:
             pass
         finally:
