@@ -41,7 +41,7 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def flight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleFlight]:
     """The paper's rhombus, flown by whoever opens the page; every test leaves it without a holder."""
     with console_flight("rhombus", tmp_path_factory.mktemp("rhombus")) as flown:

@@ -46,6 +46,7 @@ def test_the_page_comes_back_to_a_console_that_comes_back(
         pilot.until(lambda: pilot.text("#swarm-state") != "no connection")
         pilot.press("Take the hand")
         pilot.until(lambda: pilot.text("#hand-state") == "you hold it")
+        pilot.close()
     pilot.errors = [error for error in pilot.errors if "ERR_CONNECTION_REFUSED" not in error]
 
 

@@ -2,7 +2,6 @@
 
 import json
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,19 +10,20 @@ import pytest
 from glove_bridge.patterns import load_patterns
 from glove_bridge.patterns.pattern import Pattern
 from tests.browser.conftest import OpenPilot
-from tests.browser.pilot import Pilot
+from tests.browser.pilot import Json, Pilot
 from tests.browser.test_steering import GAMEPAD
 
 Samples = npt.NDArray[np.float64]
 
-# What is lit after each change of the drawing, without repetitions: [{finger: Hz}, ...].
+# What is lit, and the name of the pattern, after each change: [["{finger: Hz}", name], ...].
 WATCH_FINGERS = """
     window.lit = [];
     const look = () => {
         const fingers = [...document.querySelectorAll(".finger[data-hz]")];
         const pairs = fingers.map(({ dataset }) => [dataset.finger, Number(dataset.hz)]);
         const now = JSON.stringify(Object.fromEntries(pairs));
-        if (now !== window.lit.at(-1)) window.lit.push(now);
+        const name = document.getElementById("pattern-name").textContent;
+        if (now !== window.lit.at(-1)?.[0]) window.lit.push([now, name]);
     };
     new MutationObserver(look).observe(document.getElementById("fingers"), { subtree: true, attributes: true });
 """
@@ -40,7 +40,7 @@ RENDER = """async (frames) => {
 RATE_HZ = 44100
 
 
-def frames_of(pattern: Pattern) -> list[dict[str, Any]]:
+def frames_of(pattern: Pattern) -> list[Json]:
     """Writes a pattern as the page is told."""
     return [{"ms": f.ms, "hz": {str(finger): hz for finger, hz in f.hz.items()}} for f in pattern.frames]
 
@@ -54,15 +54,27 @@ def felt(open_pilot: OpenPilot) -> Pilot:
     pilot.take_off()
     x, y, _ = pilot.hand()
     pilot.drag_hand(x, 0.9 if y < 0 else -0.9)
-    pilot.until(lambda: pilot.patterns and pilot.patterns[-1]["outcome"] == "finished")
+    pilot.until(lambda: played_whole(pilot))
     return pilot
 
 
+def played_whole(pilot: Pilot) -> Json | None:
+    """Returns the start of the first pattern that the page has heard from its beginning to its end."""
+    begun = None
+    for event in pilot.patterns:
+        if event["outcome"] == "started" and event["elapsed"] < 0.05:
+            begun = event
+        elif event["outcome"] == "finished" and begun:
+            return begun
+    return None
+
+
 def test_a_pattern_lights_its_fingers_and_says_its_name(felt: Pilot) -> None:
-    played = next(p for p in felt.patterns if p["outcome"] == "started" and p["elapsed"] < 0.05)
-    expected = [frame["hz"] for frame in played["frames"]]
-    assert expected == [f["hz"] for f in frames_of(load_patterns("paper").patterns[played["name"]])]
-    lit = [json.loads(step) for step in felt.page.evaluate("window.lit")]
+    event = played_whole(felt)
+    assert event is not None
+    expected = [(frame["hz"], event["name"]) for frame in event["frames"]]
+    assert event["frames"] == frames_of(load_patterns("paper").patterns[event["name"]])
+    lit = [(json.loads(now), name) for now, name in felt.page.evaluate("window.lit")]
     assert any(lit[k : k + len(expected)] == expected for k in range(len(lit)))
 
 
