@@ -61,6 +61,7 @@ class SwarmView:
         self.present: set[str] = set()
         self.rejected: Counter[str] = Counter()
         self._senses = Senses(formation.ids)
+        self._sensed = frozenset(self._senses.keys)
         self._hand, self._patterns, self._cues, self._start_ns = hand, patterns, cues, start_ns
         self._formation: Sensed[FormationState] | None = None
         self._statuses: dict[str, Sensed[ProcessStatus]] = {}
@@ -84,7 +85,7 @@ class SwarmView:
 
     def take(self, arrivals: Mapping[str, Sequence[Arrival]], now_ns: int) -> list[Json]:
         """Takes what has arrived; returns the `pattern` messages that it makes."""
-        known = {key: samples for key, samples in arrivals.items() if key in self._senses.keys}
+        known = {key: samples for key, samples in arrivals.items() if key in self._sensed}
         self._senses.take(known)
         events: list[Json] = []
         for key, samples in arrivals.items():
