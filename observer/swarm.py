@@ -7,7 +7,7 @@ from shared.bus import ZenohBus
 from shared.config import load_scenario
 from shared.errors import ConfigError
 from shared.formation import build_formation
-from shared.nodes import OBSERVER, dials
+from shared.nodes import OBSERVER, dials, endpoint
 from shared.scenario import Scenario
 
 RUNS = Path("runs")
@@ -19,12 +19,14 @@ SCENARIO_FILE = "scenario.toml"
 
 
 def open_observer(scenario: Scenario) -> ZenohBus:
-    """Opens a bus that hears every node of a swarm; any number of observers may do so at once.
+    """Opens a bus to every node of a swarm, the launcher included; any number of observers may do so at once.
 
     Args:
         scenario: The resolved scenario: `net.endpoints` says where the nodes are.
     """
-    return ZenohBus(scenario.swarm.name, "", dials(scenario, build_formation(scenario), OBSERVER))
+    formation = build_formation(scenario)
+    nodes = [*dials(scenario, formation, OBSERVER), endpoint(scenario, formation, OBSERVER)]
+    return ZenohBus(scenario.swarm.name, "", nodes)
 
 
 def running_scenario(source: str | None = None, overrides: Sequence[str] = (), runs: Path = RUNS) -> Scenario:

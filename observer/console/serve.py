@@ -24,11 +24,10 @@ from observer.console.protocol import MAX_MESSAGE
 from observer.console.scene import HandMap
 from observer.console.swarm_view import SwarmView
 from observer.console.tls import certificate
-from shared.bus import ZenohBus
+from observer.swarm import open_observer
 from shared.clock import system_clock
 from shared.errors import ConfigError, DeviceError
 from shared.formation import build_formation
-from shared.nodes import OBSERVER, dials, endpoint
 from shared.pointer_link import LOOPBACK
 from shared.process import LAUNCHER_PID
 from shared.scenario import Scenario
@@ -133,9 +132,7 @@ async def _serve(
     )
     server = uvicorn.Server(_config(console, token, pair))
     inbox = Inbox(clock, _DEPTH)
-    # The launcher observes, too: it is dialled, so that it sees this process come and go.
-    nodes = [*dials(scenario, formation, OBSERVER), endpoint(scenario, formation, OBSERVER)]
-    with ZenohBus(scenario.swarm.name, "", nodes) as bus:
+    with open_observer(scenario) as bus:
         for key in view.keys:
             bus.subscribe(key, inbox)
         bus.watch_presence(view.presence_changed)
