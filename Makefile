@@ -14,8 +14,8 @@ DEVELOPMENT := .venv/.development
 help:  ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
 
-demo: $(RUNTIME)  ## fly the paper's rhombus for 30 s, simulated, one process per drone
-	$(BIN)/swarmtouch up rhombus --seconds 30 --glove terminal://
+demo: $(RUNTIME)  ## fly the paper's rhombus for 30 s, simulated, or for longer by hand in the browser
+	$(BIN)/swarmtouch up slalom --console --hand "scripted:tour?duration=26" --glove terminal://
 
 env: $(DEVELOPMENT)  ## set up everything that developing needs in .venv/
 

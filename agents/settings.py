@@ -10,11 +10,9 @@ from agents.control.single.vectors import vector
 from agents.control.steering import SteeringSettings
 from agents.control.step import Settings
 from shared.config import vehicle_settings
-from shared.fence import fence_box, shape_box
-from shared.formation import Formation, Vec
+from shared.fence import goal_box, hand_box
+from shared.formation import Formation
 from shared.scenario import Scenario
-
-UNLIMITED = 1e3
 
 
 def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Settings:
@@ -33,23 +31,14 @@ def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Sett
 
 
 def hand_settings(scenario: Scenario, formation: Formation) -> HandSettings:
-    """Returns how the hand is mapped, with the box that keeps the whole goal formation inside the fence.
-
-    The formation may turn about the hand, so the box leaves its radius free unless the heading is fixed. The
-    clip of the scenario, where there is one, replaces the box (the recorded flights clip the base alone).
-    """
-    hand = scenario.hand
-    if hand.clip is not None:
-        low = np.array([*hand.clip.min, -UNLIMITED])
-        high = np.array([*hand.clip.max, UNLIMITED])
-    else:
-        low, high = _mapped_hand_box(scenario, formation)
-    return HandSettings(hand=hand, low=vector(low), high=vector(high), radius=formation.radius)
+    """Returns how the hand is mapped, with the box that keeps the whole goal formation inside the fence."""
+    low, high = hand_box(scenario, formation)
+    return HandSettings(hand=scenario.hand, low=vector(low), high=vector(high), radius=formation.radius)
 
 
 def single_steering_settings(scenario: Scenario, formation: Formation, drone: int) -> SingleSteeringSettings:
     """Returns the steering settings of one drone."""
-    low, high = _goal_box(scenario, formation)
+    low, high = goal_box(scenario, formation)
     return SingleSteeringSettings(
         limits=scenario.limits,
         avoidance=scenario.avoidance,
@@ -64,7 +53,7 @@ def single_steering_settings(scenario: Scenario, formation: Formation, drone: in
 
 def steering_settings(scenario: Scenario, formation: Formation, drones: tuple[int, ...]) -> SteeringSettings:
     """Returns the steering settings of some drones, one row each."""
-    low, high = _goal_box(scenario, formation)
+    low, high = goal_box(scenario, formation)
     return SteeringSettings(
         limits=scenario.limits,
         avoidance=scenario.avoidance,
@@ -98,19 +87,3 @@ def _kin(scenario: Scenario, formation: Formation, drone: int) -> tuple[Kin, ...
         )
         for each in order
     )
-
-
-def _goal_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
-    low, high = fence_box(scenario, formation)
-    margin = scenario.fence.margin
-    # The ground is no fence to keep away from: a drone lands on it.
-    return low + np.array([margin, margin, 0.0]), high - margin
-
-
-def _mapped_hand_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
-    low, high = _goal_box(scenario, formation)
-    lower, upper = shape_box(scenario, formation)
-    low, high = low - lower, high - upper
-    # A fence too small for the formation leaves one point: its middle.
-    middle = (low + high) / 2.0
-    return np.minimum(low, middle), np.maximum(high, middle)

@@ -7,6 +7,8 @@ from contextlib import closing
 from human_relay.loop import run
 from human_relay.orders import OrderReader
 from human_relay.sources import open_source
+from human_relay.sources.base import HandSource
+from human_relay.sources.takeover import open_takeover
 from shared.bus import join
 from shared.clock import system_clock
 from shared.config import load_scenario
@@ -30,13 +32,19 @@ def main() -> int:
         formation = build_formation(scenario, arguments.scenario)
         with (
             join(scenario, formation, RELAY, audited=True) as bus,
-            closing(open_source(arguments.hand, clock())) as source,
+            closing(_open_hand(arguments, clock())) as source,
         ):
             orders = OrderReader(sys.stdin.fileno() if sys.stdin else None)
             run(source, orders.wait, bus, clock, stopping, hand_signer(scenario.net))
     except SwarmTouchError as error:
         return explain("relay", error)
     return 0
+
+
+def _open_hand(arguments: argparse.Namespace, start_ns: int) -> HandSource:
+    if arguments.takeover is None:
+        return open_source(arguments.hand, start_ns)
+    return open_takeover(arguments.hand, arguments.takeover, start_ns)
 
 
 def _parse() -> argparse.Namespace:
@@ -48,6 +56,7 @@ def _parse() -> argparse.Namespace:
     )
     add_process_arguments(parser)
     parser.add_argument("--hand", default="scripted:tour", help="URI of the hand source (%(default)s)")
+    parser.add_argument("--takeover", metavar="URI", help="a pointer that may take the hand over: pointer://")
     return parser.parse_args()
 
 

@@ -1,5 +1,6 @@
 """How an observer finds a swarm and listens to all of it; it dials every node and nobody dials it."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from shared.bus import ZenohBus, join
@@ -26,11 +27,12 @@ def open_observer(scenario: Scenario) -> ZenohBus:
     return join(scenario, build_formation(scenario), OBSERVER, listening=False)
 
 
-def running_scenario(source: str | None = None, runs: Path = RUNS) -> Scenario:
+def running_scenario(source: str | None = None, overrides: Sequence[str] = (), runs: Path = RUNS) -> Scenario:
     """Loads the scenario of the swarm to observe.
 
     Args:
         source: A run directory, a scenario file or a scenario's name; None for the newest flight in `runs`.
+        overrides: `key=value` items, for example the endpoints of processes that were started by hand.
         runs: Where flights are kept.
 
     Raises:
@@ -41,4 +43,4 @@ def running_scenario(source: str | None = None, runs: Path = RUNS) -> Scenario:
         if not Path(source).exists():
             raise ConfigError(f"{source}: no flight yet; start one with swarmtouch up, or name a run directory")
     folder = Path(source)
-    return load_scenario(str(folder / SCENARIO_FILE) if folder.is_dir() else source)
+    return load_scenario(str(folder / SCENARIO_FILE) if folder.is_dir() else source, overrides)

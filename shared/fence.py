@@ -5,6 +5,8 @@ import numpy as np
 from shared.formation import Formation, Vec
 from shared.scenario import Scenario
 
+UNLIMITED = 1e3
+"""Bound of a height that nothing bounds, m."""
 _CEILING = 2.0
 """Height of an automatic fence above the take-off height, m."""
 
@@ -24,6 +26,33 @@ def fence_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
         np.array(fence.min) if fence.min is not None else low,
         np.array(fence.max) if fence.max is not None else high,
     )
+
+
+def goal_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
+    """Returns the box (3,), (3,) that goals stay in: the fence less its margin, m.
+
+    The ground is no fence to keep away from: a drone lands on it.
+    """
+    low, high = fence_box(scenario, formation)
+    margin = scenario.fence.margin
+    return low + np.array([margin, margin, 0.0]), high - margin
+
+
+def hand_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
+    """Returns the box (3,), (3,) of the mapped hand that keeps the whole goal formation in the fence, m.
+
+    The formation may turn about the hand, so the box leaves its radius free unless the heading is fixed. The
+    clip of the scenario, where there is one, replaces the box (the recorded flights clip the base alone).
+    """
+    clip = scenario.hand.clip
+    if clip is not None:
+        return np.array([*clip.min, -UNLIMITED]), np.array([*clip.max, UNLIMITED])
+    low, high = goal_box(scenario, formation)
+    lower, upper = shape_box(scenario, formation)
+    low, high = low - lower, high - upper
+    # A fence too small for the formation leaves one point: its middle.
+    middle = (low + high) / 2.0
+    return np.minimum(low, middle), np.maximum(high, middle)
 
 
 def shape_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:

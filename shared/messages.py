@@ -201,7 +201,7 @@ class ProcessStatus(Message):
     """Health of one process, once a second and once more when it ends.
 
     Attributes:
-        role: `drone`, `relay`, `world`, `bridge`, `observer`.
+        role: `drone`, `relay`, `world`, `bridge`, `observer`, `console`.
         id: Number within the role, 0 for single ones.
         pid: Process number on its host.
         host: Name of its machine.

@@ -6,6 +6,9 @@ from attrs import Attribute, Factory, field, frozen
 from attrs.validators import optional
 
 from shared.messages import MAX_DRONE_ID
+from shared.pointer_link import DEFAULT_PORT
+
+MAX_PORT = 65_535
 
 Law = Literal["paper", "stable"]
 Profile = Literal["laptop", "compose", "field", "radio"]
@@ -20,6 +23,11 @@ def _positive(_: Any, attribute: "Attribute[Any]", value: float) -> None:
 def _not_negative(_: Any, attribute: "Attribute[Any]", value: float) -> None:
     if not value >= 0:
         raise ValueError(f"{attribute.name} must be >= 0, not {value!r}")
+
+
+def _port(_: Any, attribute: "Attribute[Any]", value: int) -> None:
+    if not 0 <= value <= MAX_PORT:
+        raise ValueError(f"{attribute.name} must be a port from 0 to {MAX_PORT}, not {value!r}")
 
 
 def _check_box(low: "Triple | Pair", high: "Triple | Pair") -> None:
@@ -328,6 +336,7 @@ class Net:
         interface: Network interface of the radio.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
         full_mesh: Up to this many drones everyone links to everyone; of more, only those who must.
+        pointer_port: Loopback UDP port where the relay's `pointer://` source hears consoles; 0: it has none.
     """
 
     profile: Profile = "laptop"
@@ -340,6 +349,7 @@ class Net:
     interface: str = "lo"
     adminspace: bool = False
     full_mesh: int = field(default=16, validator=_not_negative)
+    pointer_port: int = field(default=DEFAULT_PORT, validator=_port)
 
 
 @frozen(kw_only=True)

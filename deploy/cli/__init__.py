@@ -10,6 +10,9 @@ from shared.process import explain
 
 COMMANDS = {
     "up": "fly a scenario with real processes on this machine",
+    "console": "see a running flight in the browser, and be its hand",
+    "status": "say how a running flight is, by exit code, too",
+    "doctor": "look whether this machine can fly, and say what to do if not",
     "glove": "show, play and compare tactile patterns",
     "trace": "record, inspect, export and replay what a swarm says",
     "bench": "measure speed and cost against the floor of the transport",

@@ -10,7 +10,7 @@ def add_flight_arguments(parser: argparse.ArgumentParser, *, hand: str) -> None:
         "--hand",
         metavar="URI",
         default=hand,
-        help="hand source: scripted:NAME or recording:PATH (default: %(default)s)",
+        help="hand source: scripted:NAME, recording:PATH or pointer:// (default: %(default)s)",
     )
 
 
@@ -18,6 +18,16 @@ def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the scenario, and `--set KEY=VALUE`, repeatable, as `overrides`."""
     parser.add_argument("scenario", help="name of a scenario that ships, or a TOML file")
     add_overrides(parser)
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """Declares which running swarm is meant, as `run`."""
+    parser.add_argument(
+        "run",
+        nargs="?",
+        metavar="RUN",
+        help="run directory, scenario file, or a scenario that ships (default: the newest in runs/)",
+    )
 
 
 def add_overrides(parser: argparse.ArgumentParser) -> None:

@@ -12,6 +12,7 @@ scenario, one log per process and summary.json; runs/latest points at the newest
 While it flies: Ctrl-C lands and ends within 6 s, again: within 1 s; the space bar stops all motors.
 Exit code 0: everybody landed, no process ended unexpectedly, no collision, no fence exit."""
 EXAMPLE = """swarmtouch up rhombus --seconds 30
+         swarmtouch up slalom --console --hand pointer://
          swarmtouch up maze --hand recording:flights/S2_visual_1
          swarmtouch up maze --hand recording:flights/S2_visual_1 --glove terminal:// --patterns flight
          swarmtouch up line --set formation.n=8 --json"""
@@ -21,9 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the arguments."""
     add_flight_arguments(parser, hand="scripted:tour")
     parser.add_argument(
+        "--console", action="store_true", help="serve a page that shows the swarm and may take its hand"
+    )
+    parser.add_argument(
         "--glove",
         metavar="URI",
-        help="make the swarm felt: serial://DEVICE, terminal:// or record://FILE (default: no glove)",
+        help="make the swarm felt: serial://DEVICE, terminal:// or record://FILE (default: no glove; with"
+        " --console its page)",
     )
     parser.add_argument(
         "--patterns",
@@ -56,12 +61,14 @@ def run(arguments: argparse.Namespace) -> int:
     from deploy.launcher.launch import Options, launch  # noqa: PLC0415  --help must not load the bus
     from deploy.launcher.process_table import GloveChoice  # noqa: PLC0415
 
-    worn = GloveChoice(uri=arguments.glove, patterns=arguments.patterns) if arguments.glove else None
+    glove = arguments.glove or ("screen://" if arguments.console else None)
+    worn = GloveChoice(uri=glove, patterns=arguments.patterns) if glove else None
     summary = launch(
         Options(
             scenario=arguments.scenario,
             hand=arguments.hand,
             glove=worn,
+            console=arguments.console,
             seconds=arguments.seconds,
             overrides=tuple(arguments.overrides),
             runs=arguments.runs,

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 from pathlib import Path
 
 from attrs import frozen
@@ -10,20 +11,32 @@ from rich.console import Console
 from deploy.launcher.console import open_console
 from deploy.launcher.flight import Flight, Outcome
 from deploy.launcher.glove_panel import GlovePanel
+from deploy.launcher.hand_choice import HandChoice, choose_hand
 from deploy.launcher.monitor import Monitor
-from deploy.launcher.ports import free_ports
-from deploy.launcher.process_table import GloveChoice, hint_overrides, process_table, resolve_scenario
+from deploy.launcher.pattern_file import write_pattern_file
+from deploy.launcher.ports import free_port_near, free_ports
+from deploy.launcher.process_table import (
+    ConsoleChoice,
+    GloveChoice,
+    hint_overrides,
+    process_table,
+    resolve_scenario,
+)
 from deploy.launcher.run_directory import create_run_directory
 from deploy.launcher.status_view import StatusView
 from deploy.launcher.summary import Json, flight_summary, print_summary
 from glove_bridge.patterns import load_patterns
-from human_relay.sources import open_source, source_hints
+from human_relay.sources import source_hints
+from observer.console import PORT
+from observer.console.arguments import TOKEN_VARIABLE
+from observer.console.pattern_file import PATTERN_FILE
 from shared.bus import join
 from shared.clock import system_clock
 from shared.config import dump_scenario, load_scenario
 from shared.errors import ConfigError
 from shared.formation import Formation, build_formation
 from shared.nodes import OBSERVER, all_nodes
+from shared.pointer_link import LOOPBACK
 from shared.scenario import Scenario
 
 SCENARIO_FILE = "scenario.toml"
@@ -38,6 +51,7 @@ class Options:
         scenario: Name or file.
         hand: URI of the hand source.
         glove: What the operator wears, None for nothing.
+        console: Whether to serve the page, which may take the hand.
         seconds: Length of the flight, None until the hand ends it.
         overrides: `key=value` items for the scenario.
         runs: Directory of all runs.
@@ -50,6 +64,7 @@ class Options:
     scenario: str
     hand: str
     glove: GloveChoice | None = None
+    console: bool = False
     seconds: float | None = None
     overrides: tuple[str, ...] = ()
     runs: Path = Path("runs")
@@ -72,12 +87,12 @@ def launch(options: Options) -> Json:
         ConfigError: The scenario or the hand is refused; nothing has been started.
         DeviceError: The bus cannot be opened.
     """
-    scenario, formation = _resolve(options)
+    scenario, formation, hand = _resolve(options)
     run_dir = create_run_directory(options.runs)
     file = run_dir / SCENARIO_FILE
     file.write_text(dump_scenario(scenario), encoding="utf-8")
     console = open_console(stderr=options.json)
-    outcome, summary = asyncio.run(_fly(options, scenario, formation, run_dir, console))
+    outcome, summary = asyncio.run(_fly(options, scenario, formation, hand, run_dir, console))
     line = json.dumps(summary)
     (run_dir / SUMMARY_FILE).write_text(f"{line}\n", encoding="utf-8")
     print_summary(summary, console)
@@ -88,28 +103,37 @@ def launch(options: Options) -> Json:
     return summary
 
 
-def _resolve(options: Options) -> tuple[Scenario, Formation]:
-    open_source(options.hand, start_ns=0).close()  # what it refuses is refused before anything starts
+def _resolve(options: Options) -> tuple[Scenario, Formation, HandChoice]:
     if options.glove:
         load_patterns(options.glove.patterns)
     hints = hint_overrides(source_hints(options.hand))
     scenario = load_scenario(options.scenario, (*hints, *options.overrides))
     formation = build_formation(scenario, options.scenario)
-    tcp_ports, (udp_port,) = free_ports(tcp=len(all_nodes(formation)), udp=1)
-    return resolve_scenario(scenario, formation, tcp_ports, udp_port), formation
+    tcp_ports, (udp_port, pointer_port) = free_ports(tcp=len(all_nodes(formation)), udp=2)
+    hand = choose_hand(options.hand, scenario, console=options.console, free_port=pointer_port)
+    return resolve_scenario(scenario, formation, tcp_ports, udp_port, hand.pointer_port), formation, hand
 
 
 async def _fly(
-    options: Options, scenario: Scenario, formation: Formation, run_dir: Path, console: Console
+    options: Options,
+    scenario: Scenario,
+    formation: Formation,
+    hand: HandChoice,
+    run_dir: Path,
+    console: Console,
 ) -> tuple[Outcome, Json]:
+    page = _console_choice(hand, run_dir) if options.console else None
+    if options.glove:
+        write_pattern_file(run_dir, options.glove.patterns)
     rows = process_table(
         scenario,
         formation,
         file=run_dir / SCENARIO_FILE,
-        hand=options.hand,
+        hand=hand.uri,
         run_dir=run_dir,
         glove=options.glove,
         record=options.record,
+        console=page,
         verbose=options.verbose,
     )
     live = options.live and console.is_terminal
@@ -118,6 +142,8 @@ async def _fly(
         join(scenario, formation, OBSERVER) as bus,
         StatusView(console, run_dir, live=live, panel=panel) as view,
     ):
+        if page:
+            view.event(f"fly it in the browser: {_page_address(page.port)}")
         monitor = Monitor(bus, formation, system_clock())
         flight = Flight(
             formation=formation,
@@ -129,6 +155,15 @@ async def _fly(
         )
         outcome = await flight.run()
     return outcome, flight_summary(outcome, monitor, glove=options.glove)
+
+
+def _console_choice(hand: HandChoice, run_dir: Path) -> ConsoleChoice:
+    return ConsoleChoice(port=free_port_near(PORT), pattern_file=run_dir / PATTERN_FILE, takeover=hand.takeover)
+
+
+def _page_address(port: int) -> str:
+    wanted = f"?token= and what {TOKEN_VARIABLE} says" if os.environ.get(TOKEN_VARIABLE) else ""
+    return f"http://{LOOPBACK}:{port}/{wanted}"
 
 
 def _refusal(outcome: Outcome, run_dir: Path) -> str:

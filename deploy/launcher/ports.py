@@ -26,6 +26,16 @@ def free_ports(tcp: int, udp: int) -> tuple[list[int], list[int]]:
         )
 
 
+def free_port_near(preferred: int) -> int:
+    """Returns the preferred TCP port on loopback if nothing listens there, else any free one."""
+    try:
+        with socket.create_server((_LOOPBACK, preferred)):
+            return preferred
+    except OSError:
+        (port,), _ = free_ports(tcp=1, udp=0)
+        return port
+
+
 @contextmanager
 def _bound(kind: socket.SocketKind) -> Iterator[int]:
     with socket.socket(socket.AF_INET, kind) as opened:

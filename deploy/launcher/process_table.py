@@ -20,6 +20,7 @@ DRONE = "drone"
 BRIDGE = "bridge"
 RELAY = "relay"
 OBSERVER = "observer"
+CONSOLE = "console"
 
 
 @frozen(kw_only=True)
@@ -33,6 +34,22 @@ class GloveChoice:
 
     uri: str
     patterns: str
+
+
+@frozen(kw_only=True)
+class ConsoleChoice:
+    """The page in the browser.
+
+    Attributes:
+        port: TCP port on loopback.
+        pattern_file: Where the frames of the glove's patterns lie.
+        takeover: URI of the pointer by which a page may take the hand over from another source; None where the
+            hand is a pointer anyway.
+    """
+
+    port: int
+    pattern_file: Path
+    takeover: str | None
 
 
 @frozen(kw_only=True)
@@ -73,6 +90,7 @@ def process_table(
     run_dir: Path,
     glove: GloveChoice | None = None,
     record: bool = False,
+    console: ConsoleChoice | None = None,
     verbose: bool = False,
 ) -> tuple[ProcessRow, ...]:
     """Derives the processes of a flight on this machine, in the order in which they start.
@@ -85,11 +103,13 @@ def process_table(
         run_dir: Directory of this run.
         glove: What the operator wears, None for nothing.
         record: Whether everything is recorded.
+        console: The page in the browser, None for none.
         verbose: Whether the processes log debugging details.
 
     Returns:
         The recorder (if there is one), the world (if a vehicle is simulated), one agent per drone, the bridge
-        to the glove (if there is one), and the relay last: a hand may only begin to move when everybody hears.
+        to the glove and the console (if there are any), and the relay last: a hand may only begin to move when
+        everybody hears.
     """
     common = ("--scenario", str(file), *(("-v",) if verbose else ()))
     agents = tuple(
@@ -99,8 +119,12 @@ def process_table(
     world = ProcessRow(
         role=WORLD, number=0, command=_python("agents.vehicles.world", *common, "--run-dir", str(run_dir))
     )
+    takeover = ("--takeover", console.takeover) if console and console.takeover else ()
     relay = ProcessRow(
-        role=RELAY, number=0, command=_python("human_relay", *common, "--hand", hand), takes_orders=True
+        role=RELAY,
+        number=0,
+        command=_python("human_relay", *common, "--hand", hand, *takeover),
+        takes_orders=True,
     )
     worn = ("--glove", glove.uri, "--patterns", glove.patterns) if glove else ()
     bridge = ProcessRow(role=BRIDGE, number=0, command=_python("glove_bridge", *common, *worn))
@@ -109,11 +133,17 @@ def process_table(
     )
     simulated = any((vehicle_settings(scenario, i).uri or "").startswith("sim:") for i in formation.ids)
     watchers = (recorder,) if record else ()
-    return (*watchers, *((world,) if simulated else ()), *agents, *((bridge,) if glove else ()), relay)
+    page = (_console_row(console, common),) if console else ()
+    bodies = (world,) if simulated else ()
+    return (*watchers, *bodies, *agents, *((bridge,) if glove else ()), *page, relay)
 
 
 def resolve_scenario(
-    scenario: Scenario, formation: Formation, tcp_ports: Sequence[int], udp_port: int
+    scenario: Scenario,
+    formation: Formation,
+    tcp_ports: Sequence[int],
+    udp_port: int,
+    pointer_port: int = 0,
 ) -> Scenario:
     """Fills in the addresses that the scenario leaves open.
 
@@ -122,6 +152,7 @@ def resolve_scenario(
         formation: Its formation.
         tcp_ports: A free port on loopback for every node of `all_nodes(formation)`.
         udp_port: A free port on loopback for the simulated world.
+        pointer_port: Port of the relay's pointer, 0 if it has none.
 
     Returns:
         The scenario with an endpoint for every node and an address for the vehicles; what it names stays.
@@ -137,6 +168,7 @@ def resolve_scenario(
             endpoints={**free, **scenario.net.endpoints},
             # The number is free: on a radio the relay, first of all nodes, listens on no port of its own.
             multicast=scenario.net.multicast or f"{RADIO_GROUP}:{tcp_ports[0]}",
+            pointer_port=pointer_port,
         ),
         vehicles=attrs.evolve(scenario.vehicles, all=attrs.evolve(everyone, uri=uri)),
     )
@@ -152,6 +184,11 @@ def hint_overrides(hints: Mapping[str, Any]) -> list[str]:
         `key=value` items for `load_scenario`.
     """
     return [f"{key}={_toml(value)}" for key, value in hints.items()]
+
+
+def _console_row(console: ConsoleChoice, common: tuple[str, ...]) -> ProcessRow:
+    where = ("--port", str(console.port), "--patterns", str(console.pattern_file))
+    return ProcessRow(role=CONSOLE, number=0, command=_python("observer.console", *common, *where))
 
 
 def _toml(value: Any) -> str:

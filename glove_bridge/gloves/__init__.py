@@ -12,6 +12,7 @@ BACKENDS = {
     "terminal": ("glove_bridge.gloves.terminal", "TerminalGlove"),
     "record": ("glove_bridge.gloves.record", "RecordGlove"),
     "serial": ("glove_bridge.gloves.serial", "SerialGlove"),
+    "screen": ("glove_bridge.gloves.screen", "ScreenGlove"),
 }
 """Scheme -> module and class; the class is called with the `Uri`."""
 

@@ -10,6 +10,7 @@ from shared.uri import parse_uri
 BACKENDS = {
     "scripted": ("human_relay.sources.scripted", "ScriptedHand"),
     "recording": ("human_relay.sources.recording", "RecordedHand"),
+    "pointer": ("human_relay.sources.pointer", "PointerHand"),
 }
 _EXAMPLE = "scripted:tour?peak=0.4"
 
@@ -23,6 +24,7 @@ def open_source(uri: str, start_ns: int) -> HandSource:
 
     Raises:
         ConfigError: Unknown scheme or option, or a file that is missing or wrong.
+        DeviceError: What it listens on is in use.
     """
     parsed = parse_uri(uri, example=_EXAMPLE)
     return _backend(parsed)(parsed, start_ns)

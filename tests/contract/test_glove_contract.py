@@ -27,6 +27,7 @@ EI, RIGHT = PAPER["EI"], PAPER["R"]
 URIS: dict[str, Callable[[Path], str]] = {
     "none": lambda _: "none://",
     "terminal": lambda _: "terminal://",
+    "screen": lambda _: "screen://",
     "record": lambda folder: f"record://{folder}/glove.jsonl",
     "serial": lambda folder: f"serial://{folder}/port",
 }

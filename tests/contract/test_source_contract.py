@@ -130,7 +130,8 @@ def test_its_hints_fit_the_scenario(uri: str) -> None:
 
 def test_the_suite_covers_every_backend(tmp_path: Path) -> None:
     available = {"tour", "csv"}
-    assert {URIS[name](tmp_path).split(":")[0] for name in available} == set(BACKENDS)
+    played = {URIS[name](tmp_path).split(":")[0] for name in available}
+    assert played | {"pointer"} == set(BACKENDS)  # its own part of the contract: test_pointer_source.py
 
 
 @pytest.mark.parametrize("peak", [0.2, 0.5])
@@ -213,7 +214,7 @@ def test_yaw_is_relative_and_does_not_jump_at_half_a_turn() -> None:
     ("uri", "expected"),
     [
         ("tour", "no scheme"),
-        ("mouse:x", "unknown hand source 'mouse'; known ones: scripted:, recording:"),
+        ("mouse:x", "unknown hand source 'mouse'; known ones: scripted:, recording:, pointer:"),
         ("scripted:waltz", "no script 'waltz'; scripts: tour, sweep, eight, hold"),
         ("scripted:tour?speed=2", "unknown option 'speed'; known ones: duration, peak, lead"),
         ("scripted:tour?peak=fast", "peak=fast must be a number from 0.01 to 2"),

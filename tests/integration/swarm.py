@@ -152,9 +152,9 @@ class Launched:
 
 @contextmanager
 def launched(
-    name: str, hand: str, runs: Path, *overrides: str, arguments: Sequence[str] = ()
+    name: str, hand: str, runs: Path, *overrides: str, arguments: Sequence[str] = (), flying: bool = True
 ) -> Iterator[Launched]:
-    """Flies by `swarmtouch up`; begins when the whole formation follows, and ends for sure."""
+    """Flies by `swarmtouch up`, and ends for sure; `flying`: begins when the whole formation follows."""
     command = [sys.executable, "-m", "deploy.cli", "up", name, "--hand", hand, "--runs", str(runs), "--json"]
     command += arguments
     command += [argument for override in overrides for argument in ("--set", override)]
@@ -168,7 +168,7 @@ def launched(
             time.sleep(0.02)
         scenario = load_scenario(file)
         with Recorder(scenario) as recorder:
-            recorder.until(lambda: recorder.all_in(Mode.FOLLOW), START_S)
+            recorder.until(lambda: not flying or recorder.all_in(Mode.FOLLOW), START_S)
             yield Launched(launcher, scenario, recorder, runs)
     finally:
         launcher.kill()

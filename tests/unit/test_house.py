@@ -16,7 +16,7 @@ PURE = [
     *sorted((ROOT / "agents/vehicles/bodies").glob("*.py")),
     *(ROOT / f"agents/{name}.py" for name in ("agent", "settings", "stepping")),
     ROOT / "agents/vehicles/world/referee.py",
-    *(ROOT / f"human_relay/{name}.py" for name in ("velocity", "relay")),
+    *(ROOT / f"human_relay/{name}.py" for name in ("velocity", "relay", "pointing")),
     *(
         ROOT / f"glove_bridge/{name}.py"
         for name in (
@@ -32,6 +32,8 @@ PURE = [
     ),
     *sorted((ROOT / "observer/path").glob("*.py")),
     *(ROOT / f"observer/report/{name}.py" for name in ("record", "tables", "page")),
+    *(ROOT / f"observer/console/{name}.py" for name in ("access", "notices", "ownership", "protocol", "scene")),
+    ROOT / "deploy/status/report.py",
     *(
         ROOT / f"shared/{name}.py"
         for name in (
@@ -41,6 +43,7 @@ PURE = [
             "geometry",
             "messages",
             "nodes",
+            "pointer_link",
             "scenario",
             "shapes",
             "topics",
@@ -127,6 +130,7 @@ def loaded_by(module: str) -> set[str]:
 def test_a_flying_process_loads_nothing_heavy(module: str) -> None:
     loaded = loaded_by(module)
     heavy = {"rich", "rosbags", "matplotlib", "scipy", "cryptography", "mcap", "websockets", "http", "asyncio"}
+    heavy |= {"starlette", "uvicorn"}
     assert loaded & heavy == set()
     assert {"zenoh", "numpy"} <= loaded
 

@@ -1,0 +1,17 @@
+"""Every check, in the order in which things go wrong."""
+
+from collections.abc import Iterator
+
+from deploy.doctor.finding import Finding
+from deploy.doctor.hardware import all_hardware
+from deploy.doctor.network import all_network
+from deploy.doctor.software import all_software
+from shared.formation import build_formation
+from shared.scenario import Scenario
+
+
+def examine(scenario: Scenario) -> Iterator[Finding]:
+    """Looks at everything that flying a scenario on this machine needs."""
+    yield from all_software()
+    yield from all_network(scenario)
+    yield from all_hardware(len(build_formation(scenario).ids))

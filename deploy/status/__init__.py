@@ -1,0 +1,1 @@
+"""How a running swarm is: who is there, who is well."""

@@ -1,0 +1,94 @@
+"""From what was heard of a swarm to one verdict per process. Pure."""
+
+from collections.abc import Collection, Iterable
+
+from attrs import frozen
+
+from shared.messages import DroneState, Flag, ProcessStatus
+
+DRONE, RELAY, WORLD = "drone", "relay", "world"
+WELL_STATES = ("running", "starting")
+WORRYING = (
+    Flag.BLOCKED | Flag.FENCE | Flag.LOW_BATTERY | Flag.CRITICAL_BATTERY | Flag.OLD_POSE | Flag.HAND_STALE
+)
+
+
+@frozen(kw_only=True)
+class Heard:
+    """What was heard of one process.
+
+    Attributes:
+        present: Whether its liveliness token is there.
+        status: Its newest health, None if it has said nothing while somebody listened.
+        state: Its newest drone state, None for others.
+    """
+
+    present: bool = False
+    status: ProcessStatus | None = None
+    state: DroneState | None = None
+
+
+@frozen(kw_only=True)
+class Row:
+    """The verdict on one process.
+
+    Attributes:
+        token: For example `drone/2`.
+        heard: What it was made from.
+        problems: What is wrong, empty if it is well.
+    """
+
+    token: str
+    heard: Heard
+    problems: tuple[str, ...]
+
+    @property
+    def well(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.problems
+
+
+def expected_processes(ids: Iterable[int], *, simulated: bool) -> tuple[str, ...]:
+    """Returns the tokens without which a swarm does not fly.
+
+    Args:
+        ids: Numbers of the drones.
+        simulated: Whether a vehicle is simulated, which takes a world.
+    """
+    world = (f"{WORLD}/0",) if simulated else ()
+    return (f"{RELAY}/0", *world, *(f"{DRONE}/{i}" for i in ids))
+
+
+def judge(token: str, heard: Heard) -> Row:
+    """Judges one process that should be there."""
+    problems = []
+    if not heard.present:
+        problems.append("absent")
+    if heard.status is None:
+        problems.append("says nothing")
+    elif heard.status.state not in WELL_STATES:
+        problems.append(heard.status.state)
+    if token.startswith(f"{DRONE}/") and heard.state is None:
+        problems.append("sends no state")
+    if heard.state is not None:
+        problems += [
+            flag.name.lower().replace("_", " ")
+            for flag in Flag
+            if flag & WORRYING & heard.state.flags and flag.name
+        ]
+    return Row(token=token, heard=heard, problems=tuple(problems))
+
+
+def rows_of(expected: Collection[str], heard: dict[str, Heard], only: Collection[str] = ()) -> list[Row]:
+    """Judges everybody who should be there and everybody else who is.
+
+    Args:
+        expected: Tokens of those who should be there.
+        heard: What was heard, by token.
+        only: Tokens that count; empty for all.
+    """
+    known = [*expected, *sorted(set(heard) - set(expected))]
+    unknown = [token for token in only if token not in known]
+    return [
+        judge(token, heard.get(token, Heard())) for token in [*known, *unknown] if not only or token in only
+    ]

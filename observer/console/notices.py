@@ -1,0 +1,49 @@
+"""Safety cues as text: what the operator has to know, most urgent first. Pure."""
+
+from collections.abc import Collection, Mapping
+
+from observer.console.protocol import Json
+from shared.messages import DroneState, Flag, Mode
+
+_AIRBORNE = frozenset({Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND})
+_FLAGS = (
+    (Flag.CRITICAL_BATTERY, "alarm", "battery critical"),
+    (Flag.FENCE, "warning", "at the fence"),
+    (Flag.BLOCKED, "warning", "blocked: does not reach its goal"),
+    (Flag.LOW_BATTERY, "warning", "battery low"),
+    (Flag.OLD_POSE, "warning", "does not know where it is: its pose is old"),
+)
+
+
+def notices(states: Mapping[int, DroneState], missing: Collection[int], *, hand_silent: bool) -> list[Json]:
+    """Lists the conditions that hold now.
+
+    Args:
+        states: The last state of every drone that was ever heard.
+        missing: Drones of those that are not heard any more.
+        hand_silent: Whether the relay has fallen silent.
+
+    Returns:
+        `{level, text}` each; nothing about the hand while everybody is on the ground.
+    """
+    found = [
+        _notice("alarm", f"{_drones([drone])}: STOP, its motors are off")
+        for drone, state in sorted(states.items())
+        if state.mode is Mode.STOP
+    ]
+    found += [_notice("alarm", f"{_drones([drone])} is lost") for drone in sorted(missing)]
+    if hand_silent and any(state.mode in _AIRBORNE for state in states.values()):
+        found.append(_notice("alarm", "the hand is silent: the swarm holds, then lands"))
+    for flag, level, text in _FLAGS:
+        flagged = [i for i, state in sorted(states.items()) if flag in state.flags and i not in missing]
+        if flagged:
+            found.append(_notice(level, f"{_drones(flagged)} {text}"))
+    return sorted(found, key=lambda notice: notice["level"] != "alarm")
+
+
+def _drones(ids: list[int]) -> str:
+    return f"drone{'s' if len(ids) > 1 else ''} {', '.join(map(str, ids))}"
+
+
+def _notice(level: str, text: str) -> Json:
+    return {"level": level, "text": text}

@@ -1,0 +1,63 @@
+/** The WebSocket to the console; comes back by itself. */
+
+const FIRST_RETRY_MS = 250;
+const LAST_RETRY_MS = 3000;
+
+/** @typedef {{message: (message: any) => void, state: (open: boolean) => void, refused: () => void}} Ear */
+
+/** One connection at a time; whatever is sent while there is none is lost, as it would be stale. */
+export class Connection {
+  /** @type {WebSocket | null} */
+  #socket = null;
+  #retry_ms = FIRST_RETRY_MS;
+  /** @type {Ear} */
+  #ear;
+
+  /** @param {Ear} ear who is told what happens */
+  constructor(ear) {
+    this.#ear = ear;
+  }
+
+  /** @returns {boolean} */
+  get open() {
+    return this.#socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** Connects, and from then on again whenever the connection is lost. */
+  connect() {
+    const socket = new WebSocket(new URL("ws", location.href.replace(/^http/, "ws")));
+    let opened = false;
+    this.#socket = socket;
+    socket.onopen = () => {
+      opened = true;
+      this.#retry_ms = FIRST_RETRY_MS;
+      this.#ear.state(true);
+    };
+    socket.onmessage = (event) => this.#ear.message(JSON.parse(event.data));
+    socket.onclose = () => this.#lost(opened);
+  }
+
+  /** @param {object} message */
+  send(message) {
+    if (this.open) {
+      this.#socket?.send(JSON.stringify(message));
+    }
+  }
+
+  /** A refused WebSocket does not say why; a plain request does: a console that was started again may have a new
+   * token. @returns {Promise<boolean>} */
+  async #refused() {
+    return fetch("./").then(({ status }) => status === 403, () => false);
+  }
+
+  /** @param {boolean} opened whether it had ever been open */
+  async #lost(opened) {
+    this.#ear.state(false);
+    if (!opened && (await this.#refused())) {
+      this.#ear.refused();
+      return;
+    }
+    setTimeout(() => this.connect(), this.#retry_ms);
+    this.#retry_ms = Math.min(2 * this.#retry_ms, LAST_RETRY_MS);
+  }
+}

@@ -1,0 +1,206 @@
+"""Runs the console: binds its address, joins the swarm, serves pages until told to stop."""
+
+import asyncio
+import contextlib
+import logging
+import os
+import secrets
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from attrs import frozen
+
+from observer.console import PORT
+from observer.console.access import is_loopback
+from observer.console.app import make_app
+from observer.console.arguments import RANDOM_TOKEN, TOKEN_VARIABLE
+from observer.console.console import Console, run
+from observer.console.pattern_file import NO_PATTERNS, Patterns, read_patterns
+from observer.console.protocol import MAX_MESSAGE
+from observer.console.scene import HandMap
+from observer.console.swarm_view import SwarmView
+from observer.console.tls import certificate
+from observer.swarm import open_observer
+from shared.clock import system_clock
+from shared.errors import ConfigError, DeviceError
+from shared.formation import build_formation
+from shared.pointer_link import LOOPBACK
+from shared.process import LAUNCHER_PID
+from shared.scenario import Scenario
+from shared.transport import Inbox
+
+SHORTEST_TOKEN = 8
+_DEPTH = 64
+_PING_S = 5.0
+
+
+@frozen(kw_only=True)
+class Options:
+    """How to serve.
+
+    Attributes:
+        scenario: The resolved scenario of the swarm.
+        patterns: Pattern file, None without.
+        host: Address to bind.
+        port: TCP port, 0 for any free one.
+        token: `random`, or `@FILE` that holds one; None takes the environment's, if it has one.
+        tls: Folder of a certificate, which is made if it is not there; None for plain HTTP.
+    """
+
+    scenario: Scenario
+    patterns: Path | None = None
+    host: str = LOOPBACK
+    port: int = PORT
+    token: str | None = None
+    tls: Path | None = None
+
+
+def serve(options: Options, stopping: threading.Event) -> None:
+    """Serves until SIGTERM, SIGINT or `stopping`.
+
+    Raises:
+        ConfigError: The address wants a token, or a file is refused.
+        DeviceError: The address is in use.
+    """
+    token = find_token(options.token)
+    if token is None and not is_loopback(options.host):
+        raise ConfigError(
+            f"--host {options.host}: whoever reaches this address could fly; give --token {RANDOM_TOKEN},"
+            f" --token @FILE or {TOKEN_VARIABLE}"
+        )
+    pair = certificate(options.tls, options.host) if options.tls else None
+    patterns = read_patterns(options.patterns) if options.patterns else NO_PATTERNS
+    with _listening(options.host, options.port) as listener, _pointer(options.scenario) as pointer:
+        # Answered on standard output for people and for programs that start a console.
+        # Under a launcher that is a log file, and logs keep no secrets.
+        shown = None if LAUNCHER_PID in os.environ else token
+        print(f"console | {_address(options, listener, shown)}", flush=True)
+        asyncio.run(_serve(options, patterns, listener, pointer, token, pair, stopping))
+
+
+def find_token(choice: str | None) -> str | None:
+    """Returns the token.
+
+    Args:
+        choice: `random`, `@FILE`, or None for the environment variable. A token itself is refused: every user
+            of the machine can read command lines.
+
+    Raises:
+        ConfigError: The choice is none of these, or the token is too short.
+    """
+    if choice == RANDOM_TOKEN:
+        return secrets.token_urlsafe(16)
+    if choice is None:
+        token = os.environ.get(TOKEN_VARIABLE)
+    elif choice.startswith("@"):
+        try:
+            token = Path(choice[1:]).read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigError(f"--token {choice}: {error}") from error
+    else:
+        raise ConfigError(f"--token: expected {RANDOM_TOKEN} or @FILE; others can read command lines")
+    if token is not None and not (len(token) >= SHORTEST_TOKEN and token.isascii() and token.isprintable()):
+        raise ConfigError(f"the console's token must be at least {SHORTEST_TOKEN} printable ASCII characters")
+    return token
+
+
+async def _serve(
+    options: Options,
+    patterns: Patterns,
+    listener: socket.socket,
+    pointer: "_PointerSocket",
+    token: str | None,
+    pair: tuple[Path, Path] | None,
+    stopping: threading.Event,
+) -> None:
+    clock, scenario = system_clock(), options.scenario
+    formation = build_formation(scenario)
+    hand = HandMap(scenario, formation)
+    view = SwarmView(formation, hand, patterns.frames, patterns.cues, clock())
+    console = Console(
+        scenario,
+        formation,
+        view=view,
+        hand=hand,
+        point=pointer.send,
+        sender=secrets.randbits(64),
+        clock=clock,
+    )
+    server = uvicorn.Server(_config(console, token, pair))
+    inbox = Inbox(clock, _DEPTH)
+    with open_observer(scenario) as bus:
+        for key in view.keys:
+            bus.subscribe(key, inbox)
+        bus.watch_presence(view.presence_changed)
+        pages = asyncio.create_task(server.serve(sockets=[listener]))
+        pages.add_done_callback(lambda _: stopping.set())
+        await run(console, bus, inbox, clock, stopping)
+        server.should_exit = True
+        await pages
+
+
+def _config(console: Console, token: str | None, pair: tuple[Path, Path] | None) -> uvicorn.Config:
+    tls: dict[str, Any] = {"ssl_certfile": pair[0], "ssl_keyfile": pair[1]} if pair else {}
+    return uvicorn.Config(
+        make_app(console, token),
+        lifespan="off",
+        log_config=None,
+        log_level=logging.WARNING,
+        access_log=False,
+        server_header=False,
+        ws_max_size=8 * MAX_MESSAGE,
+        ws_ping_interval=_PING_S,
+        ws_ping_timeout=_PING_S,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=1,
+        **tls,
+    )
+
+
+class _PointerSocket:
+    """Sends datagrams to the relay's pointer; whether anybody listens is not known.
+
+    Args:
+        port: UDP port on loopback, 0 for nowhere.
+    """
+
+    def __init__(self, port: int) -> None:
+        self._to = (LOOPBACK, port)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+
+    def send(self, datagram: bytes) -> None:
+        if self._to[1]:
+            with contextlib.suppress(
+                OSError
+            ):  # the relay is not there, or its buffer is full: the next one counts
+                self._socket.sendto(datagram, self._to)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _pointer(scenario: Scenario) -> "contextlib.closing[_PointerSocket]":
+    return contextlib.closing(_PointerSocket(scenario.net.pointer_port))
+
+
+@contextlib.contextmanager
+def _listening(host: str, port: int) -> Iterator[socket.socket]:
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        listener = socket.create_server((host, port), family=family, backlog=64)
+    except OSError as error:
+        raise DeviceError(f"console: cannot listen on {host}:{port}: {error}; choose another --port") from error
+    with listener:
+        yield listener
+
+
+def _address(options: Options, listener: socket.socket, token: str | None) -> str:
+    host, port = listener.getsockname()[:2]
+    shown = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host  # noqa: S104  compared, not bound
+    scheme = "https" if options.tls else "http"
+    return f"{scheme}://{shown}:{port}/{f'?token={token}' if token else ''}"

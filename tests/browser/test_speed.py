@@ -1,0 +1,73 @@
+"""The page keeps up with a swarm of eight, and stays usable with thirty-two."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+from deploy.launcher.ports import free_ports
+from deploy.launcher.process_table import resolve_scenario
+from shared.config import dump_scenario, load_scenario
+from shared.formation import build_formation
+from shared.nodes import all_nodes
+from tests.browser.flight import another_console, console_flight
+from tests.browser.pilot import Pilot
+
+# Frames per second and the longest time between two of them (ms) over some seconds.
+MEASURE = """(seconds) => new Promise((done) => {
+    const times = [];
+    const frame = (now) => {
+        times.push(now);
+        if (now - times[0] < 1000 * seconds) return requestAnimationFrame(frame);
+        const gaps = times.slice(1).map((time, k) => time - times[k]);
+        done([gaps.length / seconds, Math.max(...gaps)]);
+    };
+    requestAnimationFrame(frame);
+})"""
+SECONDS = 3
+LEAST_HZ = 30.0
+LEAST_BUSY_HZ = 10.0
+"""Where the flight's own processes compete with the browser, which draws without a GPU, for two cores."""
+
+
+def frames_per_second(pilot: Pilot, drones: int) -> float:
+    """Measures, and says so."""
+    rate_hz, longest_ms = pilot.page.evaluate(MEASURE, SECONDS)
+    print(f"\n{drones} drones: {rate_hz:.1f} frames/s, the longest frame {longest_ms:.0f} ms")
+    return float(rate_hz)
+
+
+def test_the_page_keeps_up_with_a_flight_of_eight(browser: Browser, tmp_path: Path) -> None:
+    with console_flight("grid", tmp_path, "formation.n=8") as flight:
+        pilot = Pilot(browser, flight.url)
+        pilot.take_off()
+        x, y, _ = pilot.hand()
+        pilot.drag_hand(x - 1.0, y + 0.5)
+        assert frames_per_second(pilot, 8) >= LEAST_BUSY_HZ
+        pilot.until(lambda: abs(pilot.hand()[1] - y - 0.5) < 0.1)
+        pilot.close()
+        assert pilot.errors == []
+
+
+@pytest.mark.parametrize("drones", [8, 32])
+def test_the_page_itself_draws_many_drones(browser: Browser, tmp_path: Path, drones: int) -> None:
+    raw = load_scenario("grid", [f"formation.n={drones}"])
+    formation = build_formation(raw)
+    tcp, (udp, pointer) = free_ports(tcp=len(all_nodes(formation)), udp=2)
+    file = tmp_path / "scenario.toml"
+    file.write_text(dump_scenario(resolve_scenario(raw, formation, tcp, udp, pointer)))
+    swarm = subprocess.Popen([sys.executable, "-m", "tests.browser.stand_in", str(file)])
+    try:
+        with another_console(file, tmp_path) as url:
+            pilot = Pilot(browser, url)
+            pilot.until(lambda: pilot.text("#swarm-state") == f"{drones} following")
+            pilot.press("Take the hand")
+            pilot.until(lambda: pilot.text("#hand-state") == "you hold it")
+            assert frames_per_second(pilot, drones) >= LEAST_HZ
+            pilot.close()
+            assert pilot.errors == []
+    finally:
+        swarm.kill()
+        swarm.wait()

@@ -1,0 +1,94 @@
+"""`swarmtouch status`: the verdicts, and what it says of a swarm that is not there."""
+
+import json
+
+import pytest
+
+from deploy.cli import main
+from deploy.status.report import Heard, expected_processes, judge, rows_of
+from deploy.status.show import status_json, status_table
+from shared.messages import NO_FLAGS, DroneState, Flag, Mode, ProcessStatus
+
+
+def status(state: str = "running") -> ProcessStatus:
+    return ProcessStatus(
+        epoch=1, seq=1, stamp_ns=1, role="drone", id=1, pid=1, host="h", state=state, rate_hz=60.0
+    )
+
+
+def drone(flags: Flag = NO_FLAGS) -> DroneState:
+    return DroneState(
+        epoch=1,
+        seq=1,
+        stamp_ns=1,
+        id=1,
+        position=(0.0, 0.0, 1.2),
+        velocity=(0.0, 0.0, 0.0),
+        goal=(0.0, 0.0, 1.2),
+        goal_velocity=(0.0, 0.0, 0.0),
+        setpoint=(0.0, 0.0, 1.2),
+        mode=Mode.FOLLOW,
+        flags=flags,
+    )
+
+
+def test_a_simulated_swarm_needs_a_world() -> None:
+    assert expected_processes((1, 2), simulated=True) == ("relay/0", "world/0", "drone/1", "drone/2")
+    assert expected_processes((1,), simulated=False) == ("relay/0", "drone/1")
+
+
+@pytest.mark.parametrize(
+    ("heard", "problems"),
+    [
+        (Heard(present=True, status=status(), state=drone()), ()),
+        (Heard(), ("absent", "says nothing", "sends no state")),
+        (Heard(present=True, status=status("degraded"), state=drone()), ("degraded",)),
+        (Heard(present=True, status=status("ending"), state=drone()), ("ending",)),
+        (
+            Heard(present=True, status=status(), state=drone(Flag.BLOCKED | Flag.HAND_STALE | Flag.AVOIDING)),
+            ("blocked", "hand stale"),
+        ),
+    ],
+)
+def test_a_drone_is_judged_by_presence_health_and_flags(heard: Heard, problems: tuple[str, ...]) -> None:
+    row = judge("drone/1", heard)
+    assert row.problems == problems
+    assert row.well is not bool(problems)
+
+
+def test_everybody_expected_and_everybody_heard_gets_a_row() -> None:
+    well = Heard(present=True, status=status())
+    rows = rows_of(("relay/0", "drone/1"), {"bridge/0": well, "relay/0": well})
+    assert [(row.token, row.well) for row in rows] == [
+        ("relay/0", True),
+        ("drone/1", False),
+        ("bridge/0", True),
+    ]
+    assert [row.token for row in rows_of(("relay/0",), {}, only=("bridge/0",))] == ["bridge/0"]
+
+
+def test_the_table_and_the_json_say_the_same() -> None:
+    rows = [judge("drone/1", Heard(present=True, status=status(), state=drone())), judge("relay/0", Heard())]
+    assert status_table(rows, "swarm").row_count == 2
+    assert [(line["process"], line["well"], line["problems"]) for line in status_json(rows)] == [
+        ("drone/1", True, []),
+        ("relay/0", False, ["absent", "says nothing"]),
+    ]
+
+
+def test_a_swarm_that_is_not_there_is_not_well(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("deploy.status.listen.LONGEST_S", 0.2)
+    assert main(["status", "rhombus", "--json", "--set", "net.base_port=52000"]) == 1
+    rows = json.loads(capsys.readouterr().out)
+    assert {row["process"] for row in rows} == {"relay/0", "world/0", *(f"drone/{i}" for i in range(1, 5))}
+    assert not any(row["well"] for row in rows)
+
+
+def test_no_flight_at_all_is_refused(
+    tmp_path: object, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(str(tmp_path))
+    assert main(["status"]) == 2
+    assert "no flight yet" in capsys.readouterr().err
