@@ -140,7 +140,6 @@ def _settings(namespace: str, listen: str, connect: Sequence[str], adminspace: b
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "adminspace": {"enabled": adminspace, "permissions": {"read": True, "write": False}},
         "transport": {
-            **(),
             "link": {"tx": {"lease": _LEASE_MS, "keep_alive": 4}},
             "shared_memory": {"enabled": False},
         },
