@@ -88,8 +88,8 @@ def _slope(state: VelocityState) -> Vec:
     degree = min(2, (state.times.size - 1) // 2)
     if degree == 0:
         return np.zeros(3)
-    # Orthogonal polynomials 1, u, q over times in spans of the window: well conditioned at any sampling rate, and
-    # many times faster than a general least-squares solution.
+    # Polynomials 1, u, q orthogonal over the window's times, in spans: well conditioned at any sampling rate,
+    # and many times faster than a general least-squares solution.
     span = -state.times[0]
     u = state.times / span
     u -= u.sum() / u.size
