@@ -88,16 +88,18 @@ def _slope(state: VelocityState) -> Vec:
     degree = min(2, (state.times.size - 1) // 2)
     if degree == 0:
         return np.zeros(3)
-    # Orthogonal polynomials 1, u, q over the window's own times: well conditioned at any sampling rate, and
-    # many times faster than a general least-squares solution.
-    u = state.times - state.times.sum() / state.times.size
+    # Polynomials 1, u, q orthogonal over the window's times, in spans: well conditioned at any sampling rate,
+    # and many times faster than a general least-squares solution.
+    span = -state.times[0]
+    u = state.times / span
+    u -= u.sum() / u.size
     spread = u @ u
     bend = (u * u @ u) / spread
     weights = u / spread
     q = u * u - bend * u - spread / u.size
     curvature = q @ q
-    if degree == 2 and curvature > _LEAST_CURVATURE * spread * spread:
+    if degree == 2 and curvature > _LEAST_CURVATURE:
         weights += (2.0 * u[-1] - bend) / curvature * q
-    slope: Vec = weights @ (state.positions - state.positions[-1])
+    slope: Vec = weights @ (state.positions - state.positions[-1]) / span
     speed = float(np.linalg.norm(slope))
     return slope * (MAX_SPEED / speed) if speed > MAX_SPEED else slope

@@ -139,7 +139,7 @@ _KINDS = {
         "the simulators against real time",
         "--drones 4,100,1000",
         "grid",
-        (_sizes("drones", "4,100,1000"), _seconds("5")),
+        (_sizes("drones", "4,100,1000,10000"), _seconds("5")),
     ),
     "start": Kind(
         "from `swarmtouch up` to the first formation-wide step", "--n 10", "rhombus", (_number("10"),)
