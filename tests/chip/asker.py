@@ -36,17 +36,15 @@ class Asker:
 
     def greet(self, deadman_ms: int = USB_DEADMAN_MS, nonce: int = 0xBEEF) -> HelloReply:
         """Opens a session whose numbering starts at 0."""
-        reply = self.ask(Hello(0, nonce, deadman_ms))
+        reply = self._insist(Hello(0, nonce, deadman_ms))
         assert isinstance(reply, HelloReply)
         return reply
 
     def tell(self, command: Command) -> Ack:
-        """Asks for something that is acknowledged, again if need be: a chip that starts hears nothing."""
-        for _ in range(ATTEMPTS):
-            reply = self.ask(command)
-            if isinstance(reply, Ack):
-                return reply
-        raise AssertionError(f"no answer to {command}")
+        """Asks for something that is acknowledged."""
+        reply = self._insist(command)
+        assert isinstance(reply, Ack)
+        return reply
 
     def ask(self, command: Command) -> Reply | None:
         """Sends a command once and returns its answer, None if none comes in time."""
@@ -61,3 +59,11 @@ class Asker:
     def send(self, line: bytes) -> None:
         """Writes bytes."""
         self._port.write(line)
+
+    def _insist(self, command: Command) -> Reply:
+        """Asks again if need be: a chip that starts hears nothing."""
+        for _ in range(ATTEMPTS):
+            reply = self.ask(command)
+            if reply is not None:
+                return reply
+        raise AssertionError(f"no answer to {command}")

@@ -18,9 +18,9 @@ enum {
   TCCR0A = 0x44, OCR0A = 0x47, OCR0B = 0x48,
   TCCR1A = 0x80, OCR1AL = 0x88, OCR1BL = 0x8A,
   TCCR2A = 0xB0, OCR2B = 0xB4,
-  UCSR0A = 0xC0, UBRR0L = 0xC4, UBRR0H = 0xC5,
+  UCSR0A = 0xC0, UCSR0B = 0xC1, UBRR0L = 0xC4, UBRR0H = 0xC5,
 };
-enum { COMA1 = 1 << 7, COMB1 = 1 << 5, U2X0 = 1 << 1, JUMPER = 7 };
+enum { COMA1 = 1 << 7, COMB1 = 1 << 5, U2X0 = 1 << 1, RXEN0 = 1 << 4, JUMPER = 7 };
 
 // analogWrite() connects the pin before it sets the duty: shorter than this it is not meant, 20 us.
 enum { GLITCH = 320, LONGEST_QUEUE = 256, SPIN = 0x7FFE };
@@ -228,7 +228,9 @@ void chip_hang(void) {
   avr->pc = SPIN;
 }
 
-uint64_t chip_character(void) { return powered && avr->cycle >= boots_at ? uart->cycles_per_byte : 0; }
+uint64_t chip_character(void) {
+  return powered && avr->cycle >= boots_at && avr->data[UCSR0B] & RXEN0 ? uart->cycles_per_byte : 0;
+}
 
 uint32_t chip_baud(void) {
   const uint32_t divisor = (avr->data[UBRR0L] | avr->data[UBRR0H] << 8) + 1;

@@ -30,7 +30,7 @@ void chip_reset(uint32_t boot_ms);
 // Makes the firmware loop for ever with interrupts off, as a bug would.
 void chip_hang(void);
 
-// Cycles that the simulated UART takes for one character; 0 while the chip is off, booting or deaf.
+// Cycles that the simulated UART takes for one character; 0 while the chip is off or starts: it hears nothing.
 uint64_t chip_character(void);
 
 // What the firmware has set the UART to.

@@ -3,7 +3,7 @@
 //   simulated_uno FIRMWARE.elf PATH [--xbee] [--boot-ms MS] [--noise P] [--seed N]
 //
 // Says on standard output, one JSON object per line, with the simulated cycle (16 per microsecond):
-//   {"event": "ready", "cycle": 0, "path": "..."}
+//   {"event": "ready", "cycle": n, "path": "..."}          the firmware listens
 //   {"event": "motor", "cycle": n, "motor": 1..5, "duty": 0..255, "high": m}   high: cycles the pin was high so far
 //   {"event": "heard", "cycle": n}                        the last stop bit of a frame's end (a 0 after other bytes)
 //   {"event": "said", "cycle": n}                         the same of a frame to the host
@@ -24,7 +24,7 @@
 #include "line.h"
 
 // Between characters the chip gets 10 us to read the one before: simavr delays the next by what it takes.
-enum { SLICE = CYCLES_PER_MS / 2, MOST_LAG_MS = 100, REST = 160 };
+enum { SLICE = CYCLES_PER_MS / 2, MOST_LAG_MS = 100, LONGEST_START_MS = 1000, REST = 160 };
 
 static FILE *events;
 static const char *path;
@@ -119,9 +119,21 @@ static uint64_t now_us(void) {
   return now.tv_sec * 1000000ULL + now.tv_nsec / 1000;
 }
 
+static void start(void) {
+  for (int ms = 1; chip_character() == 0; ++ms) {
+    if (ms > LONGEST_START_MS) {
+      fprintf(stderr, "the firmware has not started to listen in %d ms\n", LONGEST_START_MS);
+      exit(3);
+    }
+    chip_run_until((uint64_t)ms * CYCLES_PER_MS);
+  }
+  fprintf(events, "{\"event\": \"ready\", \"cycle\": %llu, \"path\": \"%s\"}\n", (unsigned long long)chip_cycle(), path);
+}
+
 static void run(void) {
-  uint64_t started_us = now_us();
-  for (uint64_t end = SLICE; commanded(); end += SLICE) {
+  const uint64_t first = chip_cycle();
+  uint64_t started_us = now_us() - first / (CYCLES_PER_MS / 1000);
+  for (uint64_t end = first + SLICE; commanded(); end += SLICE) {
     const uint64_t due_us = started_us + end / (CYCLES_PER_MS / 1000), now = now_us();
     // A machine that could not keep up is not made up for.
     if (now > due_us + MOST_LAG_MS * 1000) started_us += now - due_us;
@@ -170,7 +182,7 @@ int main(int count, char **words) {
   }
   plug();
   fcntl(STDIN_FILENO, F_SETFL, O_NONBLOCK);
-  fprintf(events, "{\"event\": \"ready\", \"cycle\": 0, \"path\": \"%s\"}\n", path);
+  start();
   run();
   line_unplug();
   return 0;
