@@ -71,7 +71,8 @@ class Pilot:
         self.page.get_by_role("button", name=name).click()
 
     def take_off(self) -> None:
-        """Flies: takes the hand if needed, and waits until every drone follows."""
+        """Flies, once every drone is heard and nobody holds the hand; waits until all follow."""
+        self.until(lambda: not any(word in self.text("#swarm-state") for word in ("silent", "connect")))
         self.until(lambda: self.text("#take") == "Take the hand")
         self.page.click("#fly")
         self.until_mode("FOLLOW")
