@@ -7,12 +7,12 @@ from agents.agent import Agent
 from agents.loop import run
 from agents.settings import agent_settings
 from agents.vehicles import open_vehicle
-from shared.bus import ZenohBus
+from shared.bus import join
 from shared.clock import system_clock
 from shared.config import load_scenario, vehicle_settings
 from shared.errors import SwarmTouchError
 from shared.formation import build_formation
-from shared.nodes import dials, drone_node, endpoint
+from shared.nodes import drone_node
 from shared.process import StatusReporter, add_process_arguments, explain, prepare_process
 from shared.topics import DRONE_STATE
 from shared.transport import Inbox
@@ -29,14 +29,7 @@ def main() -> int:
         settings = agent_settings(scenario, formation, args.id)
         agent = Agent(scenario, formation, args.id, settings, epoch=clock())
         vehicle = open_vehicle(str(vehicle_settings(scenario, args.id).uri))
-        node = drone_node(args.id)
-        bus = ZenohBus(
-            scenario.swarm.name,
-            endpoint(scenario, formation, node),
-            dials(scenario, formation, node),
-            adminspace=scenario.net.adminspace,
-            client=scenario.net.router is not None,
-        )
+        bus = join(scenario, formation, drone_node(args.id), audited=True)
     except SwarmTouchError as error:
         return explain("agents", error)
     inbox = Inbox(clock, wakes_for=agent.triggers)

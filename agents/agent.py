@@ -14,6 +14,7 @@ from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
 from shared.formation import Formation, Vec
 from shared.messages import NO_HAND, DroneState, HandSample, Heard, Vector
+from shared.net.keyring import hand_verifier
 from shared.nodes import neighbours
 from shared.scenario import Scenario
 from shared.senses import Sensed, Senses
@@ -38,7 +39,7 @@ class Agent:
     def __init__(
         self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
     ) -> None:
-        self.senses = Senses(neighbours(formation, drone))
+        self.senses = Senses(neighbours(formation, drone), hand_verifier(scenario.net))
         self.steps = 0
         self._drone = drone
         self._epoch = epoch

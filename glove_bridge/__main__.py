@@ -8,12 +8,12 @@ from glove_bridge.bridge import Bridge
 from glove_bridge.gloves import open_glove
 from glove_bridge.loop import run
 from glove_bridge.patterns import CUES, load_patterns
-from shared.bus import ZenohBus
+from shared.bus import join
 from shared.clock import system_clock
 from shared.config import load_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import build_formation
-from shared.nodes import BRIDGE, dials, endpoint
+from shared.nodes import BRIDGE
 from shared.process import add_process_arguments, explain, prepare_process
 from shared.transport import Inbox
 
@@ -30,16 +30,9 @@ def main() -> int:
         formation = build_formation(scenario, arguments.scenario)
         patterns, cues = load_patterns(arguments.patterns), load_patterns(CUES)
         bridge = Bridge(scenario, formation, patterns, cues, clock())
-        listen, connect = endpoint(scenario, formation, BRIDGE), dials(scenario, formation, BRIDGE)
         with (
             closing(open_glove(arguments.glove)) as glove,
-            ZenohBus(
-                scenario.swarm.name,
-                listen,
-                connect,
-                adminspace=scenario.net.adminspace,
-                client=scenario.net.router is not None,
-            ) as bus,
+            join(scenario, formation, BRIDGE, audited=True) as bus,
         ):
             run(bridge, glove, bus, Inbox(clock), clock, stopping)
     except SwarmTouchError as error:

@@ -20,6 +20,7 @@ from glove_bridge.swarm_view import FORMED, DroneStates, all_heard, missing_dron
 from shared.errors import ConfigError
 from shared.formation import Formation
 from shared.messages import FormationState, Heard, PatternEvent, Wish
+from shared.net.keyring import hand_verifier
 from shared.scenario import Scenario
 from shared.senses import Senses
 from shared.topics import DRONE_STATE, HAND
@@ -71,7 +72,7 @@ class Bridge:
                 f"pattern set {patterns.name!r} means {patterns.meaning!r}; choose one that means"
                 f" {' or '.join(map(repr, MEANINGS))}"
             )
-        self.senses = Senses(formation.ids)
+        self.senses = Senses(formation.ids, hand_verifier(scenario.net))
         self.missing = formation.ids
         self.counts: Counter[Outcome] = Counter()
         self.steps = 0

@@ -7,12 +7,13 @@ from contextlib import closing
 from human_relay.loop import run
 from human_relay.orders import OrderReader
 from human_relay.sources import open_source
-from shared.bus import ZenohBus
+from shared.bus import join
 from shared.clock import system_clock
 from shared.config import load_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import build_formation
-from shared.nodes import RELAY, dials, endpoint
+from shared.net.keyring import hand_signer
+from shared.nodes import RELAY
 from shared.process import add_process_arguments, explain, prepare_process
 
 _EXAMPLE = """example: python -m human_relay --scenario rhombus --hand "scripted:tour?peak=0.4"
@@ -27,19 +28,12 @@ def main() -> int:
     try:
         scenario = load_scenario(arguments.scenario, arguments.set)
         formation = build_formation(scenario, arguments.scenario)
-        listen, connect = endpoint(scenario, formation, RELAY), dials(scenario, formation, RELAY)
         with (
-            ZenohBus(
-                scenario.swarm.name,
-                listen,
-                connect,
-                adminspace=scenario.net.adminspace,
-                client=scenario.net.router is not None,
-            ) as bus,
+            join(scenario, formation, RELAY, audited=True) as bus,
             closing(open_source(arguments.hand, clock())) as source,
         ):
             orders = OrderReader(sys.stdin.fileno() if sys.stdin else None)
-            run(source, orders.wait, bus, clock, stopping)
+            run(source, orders.wait, bus, clock, stopping, hand_signer(scenario.net))
     except SwarmTouchError as error:
         return explain("relay", error)
     return 0

@@ -3,6 +3,8 @@
 import threading
 from collections.abc import Callable
 
+from attrs import evolve
+
 from human_relay.relay import RelayState, has_news, make_sample, order, repeat_ns
 from human_relay.sources.base import HandSource
 from shared.clock import NS_PER_S, Clock
@@ -10,6 +12,7 @@ from shared.codec import encode
 from shared.messages import Wish
 from shared.nodes import RELAY
 from shared.process import StatusReporter
+from shared.signature import Sign, blank
 from shared.topics import HAND
 from shared.transport import Bus
 
@@ -17,7 +20,14 @@ WaitForOrders = Callable[[float], list[Wish]]
 """Waits for at most so many seconds; returns the operator's orders so far, at once when there are any."""
 
 
-def run(source: HandSource, wait: WaitForOrders, bus: Bus, clock: Clock, stopping: threading.Event) -> None:
+def run(
+    source: HandSource,
+    wait: WaitForOrders,
+    bus: Bus,
+    clock: Clock,
+    stopping: threading.Event,
+    sign: Sign | None = None,
+) -> None:
     """Relays until told to stop: each pose of the source once, at its time, and repeats while it is silent.
 
     Args:
@@ -26,6 +36,7 @@ def run(source: HandSource, wait: WaitForOrders, bus: Bus, clock: Clock, stoppin
         bus: Only published on.
         clock: Clock of the process, the one that the source was opened with.
         stopping: Ends the loop.
+        sign: Signs each sample, where the swarm has keys.
     """
     publish = bus.publisher(HAND)
     status = StatusReporter(bus, RELAY, 0, clock)
@@ -43,7 +54,7 @@ def run(source: HandSource, wait: WaitForOrders, bus: Bus, clock: Clock, stoppin
         offered = source.poll(now)
         if ordered or has_news(state, offered) or now >= repeat_ns(state):
             state, sample = make_sample(state, offered, now, finished=source.finished)
-            publish(encode(sample))
+            publish(sign(encode(evolve(sample, signature=blank()))) if sign else encode(sample))
         report("running")
         wake_ns = min(source.next_ns(now), repeat_ns(state))
         ordered = wait((wake_ns - clock()) / NS_PER_S)

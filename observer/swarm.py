@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from shared.bus import ZenohBus
+from shared.bus import ZenohBus, join
 from shared.config import load_scenario
 from shared.errors import ConfigError
 from shared.formation import build_formation
-from shared.nodes import OBSERVER, dials
+from shared.nodes import OBSERVER
 from shared.scenario import Scenario
 
 RUNS = Path("runs")
@@ -23,8 +23,7 @@ def open_observer(scenario: Scenario) -> ZenohBus:
     Args:
         scenario: The resolved scenario: `net.endpoints` says where the nodes are.
     """
-    connect = dials(scenario, build_formation(scenario), OBSERVER)
-    return ZenohBus(scenario.swarm.name, "", connect, client=scenario.net.router is not None)
+    return join(scenario, build_formation(scenario), OBSERVER, listening=False)
 
 
 def running_scenario(source: str | None = None, runs: Path = RUNS) -> Scenario:

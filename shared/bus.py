@@ -1,17 +1,16 @@
 """The bus over Eclipse Zenoh; the only file that imports zenoh.
 
 Topology: peers with static links, no discovery: every node listens on its endpoint and dials the endpoints it
-is given (each pair is dialled once, by the node that comes later in `shared.nodes`). The facts behind the
-settings are measured: links found by gossip never heal after a partition, one rx worker stalls healthy peers
-when another vanishes, TCP presence is seen within milliseconds.
+is given (each pair is dialled once, by the node that comes later in `shared.nodes`); `shared.net` says how.
 """
 
 import json
 import logging
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Self
 
 # Read once when the library loads: with a single rx worker, a peer that vanishes silently stalls the others.
@@ -19,16 +18,20 @@ os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 8))")
 
 import zenoh
 
+from shared.clock import system_clock
 from shared.errors import DeviceError
+from shared.formation import Formation
+from shared.net.audit import LOG_FILTER, Audit
+from shared.net.keyring import Keyring
+from shared.net.log_tap import tap_stdout
+from shared.net.settings import Settings, node_settings, router_settings
+from shared.scenario import Scenario
 from shared.topics import ALIVE, Delivery, Topic
 from shared.transport import Inbox, Publish
 
 CLOSE_TIMEOUT_S = 2.0
 """Closing may hang during a partition; after this long the process ends without it."""
 
-_LEASE_MS = 1000
-_ROUTER_TIMEOUT_MS = 3000
-_READ_ONLY = {"read": True, "write": False}
 _OTHERS = zenoh.Locality.REMOTE
 _log = logging.getLogger("bus")
 _QOS: dict[Delivery, dict[str, Any]] = {
@@ -48,36 +51,44 @@ _QOS: dict[Delivery, dict[str, Any]] = {
 
 
 class ZenohBus:
-    """One Zenoh session; see `shared.transport.Bus`.
+    """One process's Zenoh sessions; see `shared.transport.Bus`.
 
     Args:
-        namespace: Name of the swarm, prefix of every key.
-        listen: Own endpoint, empty to listen nowhere.
-        connect: Endpoints to dial, again and again until they answer.
-        adminspace: Whether to answer adminspace queries.
-        client: Whether what it dials is a router that forwards everything, instead of one peer of many.
+        settings: Configuration of the session that it publishes on, see `shared.net.settings`.
+        ears: Of sessions that it only listens to, as the hand's radio.
 
     Raises:
-        DeviceError: The endpoint cannot be listened on, or no router answers (later it may vanish and return).
+        DeviceError: An endpoint cannot be listened on, or no router answers (later it may vanish and return).
     """
 
-    def __init__(
-        self,
-        namespace: str,
-        listen: str,
-        connect: Sequence[str] = (),
-        *,
-        adminspace: bool = False,
-        client: bool = False,
-    ) -> None:
-        tree = _settings("client" if client else "peer", listen, connect)
-        tree |= {"namespace": namespace, "adminspace": {"enabled": adminspace, "permissions": _READ_ONLY}}
-        self._session = _open(tree)
+    def __init__(self, settings: Settings, *ears: Settings) -> None:
         self._declared: list[Any] = []
+        self._sessions: list[zenoh.Session] = []
+        self._audit: Audit | None = None
+        for each in (settings, *ears):
+            self._sessions.append(_open(each))
+
+    def watch_links(self, audit: Audit) -> None:
+        """Tells an audit of every link of the publishing session, and of what Zenoh refuses on it.
+
+        Zenoh's log is set up once per process: call it before anybody else does.
+        """
+        self._audit = audit
+
+        def changed(event: zenoh.LinkEvent) -> None:
+            identity, name = str(event.link.zid), event.link.auth_identifier
+            audit.linked(identity, name, present=event.kind == zenoh.SampleKind.PUT)
+
+        listener = self._sessions[0].info.declare_link_events_listener(changed, history=True)
+        self._declared.append(listener)
+
+    def audit(self) -> dict[str, float]:
+        """See `Bus.audit`."""
+        return self._audit.metrics() if self._audit else {}
 
     def publisher(self, topic: Topic, **parts: object) -> Publish:
         """See `Bus.publisher`."""
-        declared = self._session.declare_publisher(topic.key(**parts), **_QOS[topic.delivery])
+        declared = self._sessions[0].declare_publisher(topic.key(**parts), **_QOS[topic.delivery])
         self._declared.append(declared)
         return declared.put
 
@@ -87,11 +98,12 @@ class ZenohBus:
         def store(sample: zenoh.Sample) -> None:
             inbox.put(str(sample.key_expr), sample.payload.to_bytes())
 
-        self._declared.append(self._session.declare_subscriber(key_expression, store, allowed_origin=_OTHERS))
+        for session in self._sessions:
+            self._declared.append(session.declare_subscriber(key_expression, store, allowed_origin=_OTHERS))
 
     def announce(self, role: str, number: int) -> None:
         """See `Bus.announce`."""
-        token = self._session.liveliness().declare_token(ALIVE.format(role=role, id=number))
+        token = self._sessions[0].liveliness().declare_token(ALIVE.format(role=role, id=number))
         self._declared.append(token)
 
     def watch_presence(self, on_change: Callable[[str, bool], None]) -> None:
@@ -101,7 +113,7 @@ class ZenohBus:
         def changed(sample: zenoh.Sample) -> None:
             on_change(str(sample.key_expr).removeprefix(prefix), sample.kind == zenoh.SampleKind.PUT)
 
-        watcher = self._session.liveliness().declare_subscriber(f"{prefix}**", changed, history=True)
+        watcher = self._sessions[0].liveliness().declare_subscriber(f"{prefix}**", changed, history=True)
         self._declared.append(watcher)
 
     def close(self) -> None:
@@ -112,7 +124,8 @@ class ZenohBus:
         for declared in self._declared:
             declared.undeclare()
         self._declared.clear()
-        self._session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        for session in self._sessions:
+            session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
         watchdog.cancel()
 
     def __enter__(self) -> Self:
@@ -120,6 +133,45 @@ class ZenohBus:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def join(
+    scenario: Scenario, formation: Formation, node: str, *, listening: bool = True, audited: bool = False
+) -> ZenohBus:
+    """Joins the swarm as one of its nodes.
+
+    Args:
+        scenario: The scenario; `net` says how.
+        formation: Its formation.
+        node: Name of the node (`shared.nodes`).
+        listening: False for a node that nobody dials, as any number of observers are.
+        audited: Whether to count and log whom the access rules refuse; it takes standard output over, so it
+            is for processes that do not talk to a terminal.
+
+    Raises:
+        ConfigError: The profile wants keys that are not there.
+        DeviceError: The endpoint cannot be listened on.
+    """
+    settings = node_settings(scenario, formation, node, listening=listening)
+    if not (scenario.net.keys and audited):
+        return ZenohBus(*settings)
+    audit = Audit(Keyring(Path(scenario.net.keys)).members())
+    _listen_to_zenoh(audit)
+    bus = ZenohBus(*settings)
+    bus.watch_links(audit)
+    return bus
+
+
+def _listen_to_zenoh(audit: Audit) -> None:
+    clock = system_clock()
+
+    def on_log(text: str) -> None:
+        audit.read(text)
+        if report := audit.report(clock()):
+            _log.warning("refused: %s", report)
+
+    tap_stdout(on_log)
+    zenoh.init_log_from_env_or(LOG_FILTER)
 
 
 @contextmanager
@@ -132,20 +184,20 @@ def routing(listen: str) -> Iterator[None]:
     Raises:
         DeviceError: The endpoint cannot be listened on.
     """
-    session = _open(_settings("router", listen, ()))
+    session = _open(router_settings(listen))
     try:
         yield
     finally:
         session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
 
 
-def _open(tree: dict[str, Any]) -> zenoh.Session:
+def _open(settings: Settings) -> zenoh.Session:
     try:
-        return zenoh.open(zenoh.Config.from_json5(json.dumps(tree)))
+        return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
-        if tree["mode"] == "client":
+        if settings["mode"] == "client":
             raise DeviceError(f"no router: {error}. Does one run where net.router says?") from error
-        where = ", ".join(tree["listen"]["endpoints"]) or "no endpoint"
+        where = ", ".join(settings["listen"]["endpoints"]) or "no endpoint"
         raise DeviceError(
             f"cannot open the bus at {where}: {error}. Is the port in use? Set net.endpoints or net.base_port"
         ) from error
@@ -155,23 +207,3 @@ def _give_up() -> None:
     _log.error("the bus did not close within %.1f s; ending without it", CLOSE_TIMEOUT_S)
     logging.shutdown()
     os._exit(1)
-
-
-def _settings(mode: str, listen: str, connect: Sequence[str]) -> dict[str, Any]:
-    retry = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 1.5}
-    return {
-        "mode": mode,
-        "listen": {"endpoints": [listen] if listen else [], "exit_on_failure": True},
-        "connect": {
-            "endpoints": list(connect),
-            # Peers dial in the background for ever; a client can only wait, and is deaf to signals meanwhile.
-            "timeout_ms": _ROUTER_TIMEOUT_MS if mode == "client" else -1,
-            "exit_on_failure": False,
-            "retry": retry,
-        },
-        "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": {
-            "link": {"tx": {"lease": _LEASE_MS, "keep_alive": 4}},
-            "shared_memory": {"enabled": False},
-        },
-    }

@@ -33,9 +33,8 @@ def encode(message: Message) -> bytes:
     Returns:
         The payload; the same message always gives the same bytes.
     """
-    fields = _converter.unstructure(message)
-    fields["v"] = SCHEMA_VERSION
-    return bytes(msgpack.packb(fields))
+    # The version comes first and the fields keep their order: a signature is the end of the payload.
+    return bytes(msgpack.packb({"v": SCHEMA_VERSION, **_converter.unstructure(message)}))
 
 
 def decode(payload: bytes, kind: type[M]) -> M:

@@ -6,7 +6,7 @@ Order matters: of two nodes that need each other the later one in `all_nodes` di
 import numpy as np
 
 from shared.formation import Formation
-from shared.scenario import Scenario
+from shared.scenario import Net, Scenario
 
 RELAY = "relay"
 WORLD = "world"
@@ -38,8 +38,14 @@ def endpoint(scenario: Scenario, formation: Formation, node: str) -> str:
     net = scenario.net
     if net.router is not None:
         return ""
-    default = net.endpoint or f"tcp/127.0.0.1:{net.base_port + all_nodes(formation).index(node)}"
+    pattern = net.endpoint or ("tcp/{node}:7447" if net.profile == "compose" else None)
+    default = pattern or loopback(net, net.base_port + all_nodes(formation).index(node))
     return net.endpoints.get(node, default.replace("{node}", node.replace("/", "-")))
+
+
+def loopback(net: Net, port: int) -> str:
+    """Returns the endpoint of a port on this machine: QUIC where there are keys, else TCP."""
+    return f"quic/127.0.0.1:{port}?mixed_rel=1" if net.keys else f"tcp/127.0.0.1:{port}"
 
 
 def dials(scenario: Scenario, formation: Formation, node: str) -> list[str]:

@@ -126,6 +126,7 @@ class StatusReporter:
         self._due_ns = self._last_ns = self._epoch
         self._steps = 0
         self._meter = ResourceMeter()
+        self._audit = bus.audit
         bus.announce(role, number)
 
     def tick(
@@ -165,7 +166,7 @@ class StatusReporter:
             cpu=cpu,
             rss_mb=rss_mb,
             rejected=dict(rejected or {}),
-            metrics=metrics(),
+            metrics={**metrics(), **self._audit()},
         )
         self._publish(encode(status))
         feed_watchdog()

@@ -8,6 +8,7 @@ from attrs.validators import optional
 from shared.messages import MAX_DRONE_ID
 
 Law = Literal["paper", "stable"]
+Profile = Literal["laptop", "compose", "field", "radio"]
 Shape = Literal["rhombus", "triangle", "line", "vee", "grid", "custom"]
 
 
@@ -307,18 +308,29 @@ class Net:
     """`[net]`: where the processes meet.
 
     Attributes:
+        profile: How: `laptop` (TCP on loopback), `compose` (TCP
+            between containers, by name), `field` (QUIC, mutual TLS, access rules, signed hand) or `radio` (the
+            hand over UDP multicast beside the mesh).
         base_port: First port on loopback of nodes without an endpoint.
         endpoint: Endpoint of nodes without an entry in `endpoints`, `{node}` is replaced by the name of the
             node with a dash; for example `tcp/{node}.swarm:7447`, where names resolve.
         endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "tcp/10.0.0.2:7447"`.
         router: Endpoint of a router whose client every node is, instead of linking to each other.
+        keys: Directory with the keys of this node (`swarmtouch net keys`); empty: none.
+        multicast: Group of the hand's radio, for example `udp/224.0.0.225:7450`; empty: that one, or a free
+            port of it for a flight on one machine.
+        interface: Network interface of the radio.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
     """
 
+    profile: Profile = "laptop"
     base_port: int = field(default=7460, validator=_positive)
     endpoint: str | None = None
     endpoints: dict[str, str] = Factory(dict)
     router: str | None = None
+    keys: str = ""
+    multicast: str = ""
+    interface: str = "lo"
     adminspace: bool = False
 
 

@@ -11,11 +11,13 @@ from shared.clock import NS_PER_S
 from shared.codec import decode
 from shared.errors import DecodeError
 from shared.messages import DroneState, HandSample, Heard, Message
+from shared.signature import Verify
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
 M = TypeVar("M", bound=Message)
 
+NEVER = float("inf")
 _HAND_KEY = HAND.key()
 _LOG_PERIOD_NS = 5 * NS_PER_S
 _log = logging.getLogger("senses")
@@ -43,6 +45,7 @@ class Senses:
 
     Args:
         ids: Numbers of the drones to listen to.
+        verify: Checks the signature of hand samples; None accepts unsigned ones.
 
     Attributes:
         hand: Newest hand sample, None before the first.
@@ -50,10 +53,11 @@ class Senses:
         rejected: Dropped samples by reason.
     """
 
-    def __init__(self, ids: Iterable[int]) -> None:
+    def __init__(self, ids: Iterable[int], verify: Verify | None = None) -> None:
         self.hand: Sensed[HandSample] | None = None
         self.drones: dict[int, Sensed[DroneState]] = {}
         self.rejected: Counter[str] = Counter()
+        self._verify = verify
         self._ids = {DRONE_STATE.key(id=drone): drone for drone in ids}
         self._logged_ns = 0
 
@@ -73,8 +77,11 @@ class Senses:
 
     def _take_one(self, key: str, payload: bytes, arrival_ns: int) -> None:
         if key == _HAND_KEY:
+            if self._verify:
+                self._verify(payload)
             sample = decode(payload, HandSample)
-            _check_newer(sample, self.hand, arrival_ns, HAND.stale_s)
+            # A signed sample that is older was recorded from the air: no silence makes it acceptable.
+            _check_newer(sample, self.hand, arrival_ns, NEVER if self._verify else HAND.stale_s)
             self.hand = Sensed(sample, arrival_ns)
             return
         drone = self._ids.get(key)

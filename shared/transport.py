@@ -86,6 +86,9 @@ class Bus(Protocol):
     def watch_presence(self, on_change: Callable[[str, bool], None]) -> None:
         """Calls `on_change("role/id", present)` for every process that appears or disappears."""
 
+    def audit(self) -> dict[str, float]:
+        """Returns who is linked and how often whom was refused; empty where links carry no names."""
+
     def close(self) -> None:
         """Leaves the swarm; returns in bounded time, may be called twice."""
 

@@ -12,6 +12,7 @@ from deploy.bench.metronome import tick
 from shared.bus import ZenohBus
 from shared.clock import Clock, system_clock
 from shared.errors import SwarmTouchError
+from shared.net.settings import peer_settings
 from shared.process import explain, prepare_process
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Inbox, Publish
@@ -46,7 +47,7 @@ def main() -> int:
     stopping = prepare_process(f"bare/{args.node}")
     clock = system_clock()
     try:
-        bus = ZenohBus(args.swarm, args.listen, args.connect)
+        bus = ZenohBus(peer_settings(args.swarm, args.listen, args.connect))
     except SwarmTouchError as error:
         return explain("floor_zenoh", error)
     with bus:

@@ -24,13 +24,13 @@ from deploy.launcher.launch import SCENARIO_FILE
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.run_directory import LATEST
 from observer.flight_stats import FlightStats
-from shared.bus import ZenohBus
+from shared.bus import join
 from shared.clock import NS_PER_S, Clock, system_clock
 from shared.config import load_scenario
 from shared.errors import ConfigError
 from shared.formation import Formation, build_formation
 from shared.messages import DroneState, HandSample
-from shared.nodes import BRIDGE, RELAY, WORLD, dials, drone_node, endpoint
+from shared.nodes import BRIDGE, RELAY, WORLD, drone_node, endpoint
 from shared.scenario import Scenario
 
 LIMIT_S = 60.0
@@ -193,8 +193,7 @@ def _watch(process: "subprocess.Popen[bytes]", file: Path, clock: Clock, begun: 
     opened = until(lambda: members <= _listening())
     # Only now: a link that is dialled before its listener is there comes up to a second late.
     relayed = until(lambda: _port(scenario, formation, RELAY) in _listening())
-    listen, connect = endpoint(scenario, formation, BRIDGE), dials(scenario, formation, BRIDGE)
-    with ZenohBus(scenario.swarm.name, listen, connect) as bus:
+    with join(scenario, formation, BRIDGE) as bus:
         monitor, first = Monitor(bus, formation, clock), FirstSteps(formation)
         monitor.stats = first
 

@@ -17,11 +17,11 @@ from deploy.bench.usage import Usage, read_usage
 from deploy.launcher.ports import free_ports
 from deploy.launcher.process_table import RELAY, ProcessRow, process_table, resolve_scenario
 from deploy.launcher.supervisor import Child, Supervisor
-from shared.bus import ZenohBus
+from shared.bus import ZenohBus, join
 from shared.config import dump_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import Formation
-from shared.nodes import OBSERVER, all_nodes, dials, endpoint
+from shared.nodes import OBSERVER, all_nodes
 from shared.scenario import Scenario
 
 HAND = "scripted:tour"
@@ -128,8 +128,7 @@ def fly_bare_udp(
 
 
 def _observer(scenario: Scenario, formation: Formation) -> ZenohBus:
-    listen, connect = endpoint(scenario, formation, OBSERVER), dials(scenario, formation, OBSERVER)
-    return ZenohBus(scenario.swarm.name, listen, connect)
+    return join(scenario, formation, OBSERVER)
 
 
 def _run(rows: Iterable[ProcessRow], ear: Ear, seconds: float, drones: int) -> Phase:

@@ -13,6 +13,7 @@ COMMANDS = {
     "glove": "show, play and compare tactile patterns",
     "bench": "measure speed and cost against the floor of the transport",
     "sim": "fly a scenario on a virtual clock in one process",
+    "net": "keys of a swarm and the network configuration of its nodes",
     "scenarios": "list the scenarios that ship",
 }
 """Command -> one line; the module has the command's name."""

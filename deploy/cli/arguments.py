@@ -5,13 +5,18 @@ import argparse
 
 def add_flight_arguments(parser: argparse.ArgumentParser, *, hand: str) -> None:
     """Declares what to fly: the scenario, the hand (with its default) and `--set`."""
-    parser.add_argument("scenario", help="name of a scenario that ships, or a TOML file")
+    add_scenario_arguments(parser)
     parser.add_argument(
         "--hand",
         metavar="URI",
         default=hand,
         help="hand source: scripted:NAME or recording:PATH (default: %(default)s)",
     )
+
+
+def add_scenario_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declares the scenario, and `--set KEY=VALUE`, repeatable, as `overrides`."""
+    parser.add_argument("scenario", help="name of a scenario that ships, or a TOML file")
     add_overrides(parser)
 
 

@@ -18,12 +18,12 @@ from deploy.launcher.status_view import StatusView
 from deploy.launcher.summary import Json, flight_summary, print_summary
 from glove_bridge.patterns import load_patterns
 from human_relay.sources import open_source, source_hints
-from shared.bus import ZenohBus
+from shared.bus import join
 from shared.clock import system_clock
 from shared.config import dump_scenario, load_scenario
 from shared.errors import ConfigError
 from shared.formation import Formation, build_formation
-from shared.nodes import OBSERVER, all_nodes, dials, endpoint
+from shared.nodes import OBSERVER, all_nodes
 from shared.scenario import Scenario
 
 SCENARIO_FILE = "scenario.toml"
@@ -100,7 +100,6 @@ def _resolve(options: Options) -> tuple[Scenario, Formation]:
 async def _fly(
     options: Options, scenario: Scenario, formation: Formation, run_dir: Path, console: Console
 ) -> tuple[Outcome, Json]:
-    listen, connect = endpoint(scenario, formation, OBSERVER), dials(scenario, formation, OBSERVER)
     rows = process_table(
         scenario,
         formation,
@@ -113,7 +112,7 @@ async def _fly(
     live = options.live and console.is_terminal
     panel = GlovePanel(options.glove.patterns) if options.glove else None
     with (
-        ZenohBus(scenario.swarm.name, listen, connect) as bus,
+        join(scenario, formation, OBSERVER) as bus,
         StatusView(console, run_dir, live=live, panel=panel) as view,
     ):
         monitor = Monitor(bus, formation, system_clock())

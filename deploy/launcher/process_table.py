@@ -11,7 +11,8 @@ from attrs import frozen
 
 from shared.config import vehicle_settings
 from shared.formation import Formation
-from shared.nodes import all_nodes
+from shared.net.settings import RADIO_GROUP
+from shared.nodes import all_nodes, loopback
 from shared.scenario import Scenario
 
 WORLD = "world"
@@ -118,12 +119,18 @@ def resolve_scenario(
     Returns:
         The scenario with an endpoint for every node and an address for the vehicles; what it names stays.
     """
-    free = {node: f"tcp/127.0.0.1:{port}" for node, port in zip(all_nodes(formation), tcp_ports, strict=True)}
+    nodes = zip(all_nodes(formation), tcp_ports, strict=True)
+    free = {node: loopback(scenario.net, port) for node, port in nodes}
     everyone = scenario.vehicles.all
     uri = everyone.uri or f"sim://127.0.0.1:{udp_port}/{{id}}"
     return attrs.evolve(
         scenario,
-        net=attrs.evolve(scenario.net, endpoints={**free, **scenario.net.endpoints}),
+        net=attrs.evolve(
+            scenario.net,
+            endpoints={**free, **scenario.net.endpoints},
+            # The number is free: on a radio the relay, first of all nodes, listens on no port of its own.
+            multicast=scenario.net.multicast or f"{RADIO_GROUP}:{tcp_ports[0]}",
+        ),
         vehicles=attrs.evolve(scenario.vehicles, all=attrs.evolve(everyone, uri=uri)),
     )
 

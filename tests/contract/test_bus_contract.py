@@ -17,6 +17,7 @@ from deploy.launcher.ports import free_ports
 from shared.bus import ZenohBus, routing
 from shared.errors import DeviceError
 from shared.memory_bus import MemoryBus, MemoryNetwork
+from shared.net.settings import client_settings, peer_settings
 from shared.topics import DRONE_STATE, HAND, STATUS
 from shared.transport import Bus, Inbox, Publish
 
@@ -37,7 +38,7 @@ def zenoh_swarm() -> Iterator[OpenBus]:
     earlier: list[str] = []
 
     def open_bus() -> Bus:
-        bus = ZenohBus("swarm", f"tcp/127.0.0.1:{(port := next(ports))}", tuple(earlier))
+        bus = ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{(port := next(ports))}", tuple(earlier)))
         earlier.append(f"tcp/127.0.0.1:{port}")
         return bus
 
@@ -49,7 +50,7 @@ def routed_swarm() -> Iterator[OpenBus]:
     """Each bus is client of one router."""
     where = f"tcp/127.0.0.1:{free_ports(tcp=1, udp=0)[0][0]}"
     with routing(where):
-        yield lambda: ZenohBus("swarm", "", [where], client=True)
+        yield lambda: ZenohBus(client_settings("swarm", where))
 
 
 @pytest.fixture(params=[memory_swarm, zenoh_swarm, routed_swarm])
@@ -256,10 +257,10 @@ def test_closing_ends_the_subscriptions_and_may_be_repeated(open_bus: OpenBus) -
 def test_processes_may_start_in_any_order() -> None:
     """Zenoh: whoever is dialled before it listens is found as soon as it does."""
     port, other = free_ports(tcp=2, udp=0)[0]
-    with ZenohBus("swarm", f"tcp/127.0.0.1:{other}", [f"tcp/127.0.0.1:{port}"]) as early:
+    with ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{other}", [f"tcp/127.0.0.1:{port}"])) as early:
         inbox = inbox_of(early, HAND.key())
         early.announce("drone", 1)
-        with ZenohBus("swarm", f"tcp/127.0.0.1:{port}") as late:
+        with ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{port}")) as late:
             Presence(late).until("drone/1")
             late.publisher(HAND)(b"found")
             assert collect(inbox, 1) == {HAND.key(): [b"found"]}
@@ -267,7 +268,7 @@ def test_processes_may_start_in_any_order() -> None:
 
 def test_swarms_of_other_names_are_not_heard() -> None:
     (port,) = free_ports(tcp=1, udp=0)[0]
-    with ZenohBus("ours", f"tcp/127.0.0.1:{port}") as receiver:
+    with ZenohBus(peer_settings("ours", f"tcp/127.0.0.1:{port}")) as receiver:
         inbox = inbox_of(receiver, HAND.key())
         receiver.announce("drone", 1)
         tree = {"mode": "client", "connect": {"endpoints": [f"tcp/127.0.0.1:{port}"]}}
@@ -281,18 +282,18 @@ def test_swarms_of_other_names_are_not_heard() -> None:
 def test_an_endpoint_in_use_is_refused_with_a_hint() -> None:
     (port,) = free_ports(tcp=1, udp=0)[0]
     with (
-        ZenohBus("swarm", f"tcp/127.0.0.1:{port}"),
+        ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{port}")),
         pytest.raises(DeviceError, match=rf"{port}.*Is the port in use\? Set net\.endpoints"),
     ):
-        ZenohBus("swarm", f"tcp/127.0.0.1:{port}")
+        ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{port}"))
 
 
 def test_clients_outlive_their_router_and_need_one_to_begin() -> None:
     where = f"tcp/127.0.0.1:{free_ports(tcp=1, udp=0)[0][0]}"
     with pytest.raises(DeviceError, match=r"no router.*net\.router"):
-        ZenohBus("swarm", "", [where], client=True)
+        ZenohBus(client_settings("swarm", where))
     with routing(where):
-        sender, receiver = (ZenohBus("swarm", "", [where], client=True) for _ in range(2))
+        sender, receiver = (ZenohBus(client_settings("swarm", where)) for _ in range(2))
     with sender, receiver, routing(where):
         inbox = inbox_of(receiver, HAND.key())
         sender.announce("drone", 1)

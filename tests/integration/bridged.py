@@ -14,6 +14,7 @@ from shared.clock import system_clock
 from shared.codec import decode
 from shared.formation import build_formation
 from shared.messages import FormationState, PatternEvent
+from shared.net.settings import peer_settings
 from shared.nodes import BRIDGE, endpoint
 from shared.scenario import Scenario
 from shared.topics import FORMATION_STATE, PATTERN
@@ -36,7 +37,7 @@ class BridgeListener:
         self.states: list[FormationState] = []
         self._inbox = Inbox(system_clock(), depth=100_000)
         where = endpoint(scenario, build_formation(scenario), BRIDGE)
-        self._bus = ZenohBus(scenario.swarm.name, "", [where])
+        self._bus = ZenohBus(peer_settings(scenario.swarm.name, "", [where]))
         for topic in (PATTERN, FORMATION_STATE):
             self._bus.subscribe(topic.wildcard, self._inbox)
 

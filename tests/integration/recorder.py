@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Self
 
-from observer.swarm import open_observer
+from shared.bus import join
 from shared.clock import NS_PER_S, system_clock
 from shared.codec import decode
 from shared.errors import DecodeError
 from shared.formation import build_formation
 from shared.messages import DroneState, HandSample, Message, Mode, ProcessStatus
+from shared.nodes import OBSERVER
 from shared.scenario import Scenario
 from shared.topics import DRONE_STATE, HAND, STATUS
 from shared.transport import Inbox
@@ -47,7 +48,7 @@ class Recorder:
         self._inbox = Inbox(self.clock, depth=1_000_000)
         self._known: set[tuple[int, int, int]] = set()
         # Best effort may lose a sample on one link; of two links, it hardly does on both.
-        self._buses = [open_observer(scenario) for _ in range(2)]
+        self._buses = [join(scenario, formation, OBSERVER, listening=False) for _ in range(2)]
         for bus in self._buses:
             for key in (HAND.key(), *(DRONE_STATE.key(id=drone) for drone in self.ids), STATUS.wildcard):
                 bus.subscribe(key, self._inbox)

@@ -18,6 +18,7 @@ from shared.codec import decode, encode
 from shared.config import dump_scenario, load_scenario
 from shared.formation import build_formation
 from shared.messages import ORIGIN, DroneState, Mode, ProcessStatus
+from shared.net.settings import peer_settings
 from shared.nodes import all_nodes, drone_node, endpoint
 from shared.scenario import Scenario
 from shared.topics import DRONE_STATE, STATUS
@@ -99,7 +100,7 @@ def test_half_a_swarm_garbage_and_no_glove(bridge: "subprocess.Popen[str]", scen
     inbox, seq = Inbox(system_clock(), depth=1000), 0
     statuses: list[ProcessStatus] = []
     with (
-        ZenohBus("rhombus", endpoint(scenario, FORMATION, drone_node(1)), []) as swarm,
+        ZenohBus(peer_settings("rhombus", endpoint(scenario, FORMATION, drone_node(1)), [])) as swarm,
         closing(BridgeListener(scenario)) as listener,
     ):
         swarm.subscribe(STATUS.wildcard, inbox)

@@ -10,11 +10,12 @@ from agents.vehicles.world.radio import Radio
 from agents.vehicles.world.record import RefereeFile
 from agents.vehicles.world.setup import plan_world
 from agents.vehicles.world.world import World
-from shared.bus import ZenohBus
+from shared.bus import join
 from shared.clock import system_clock
 from shared.config import load_scenario
 from shared.errors import SwarmTouchError
-from shared.nodes import WORLD, dials, endpoint
+from shared.net.keyring import hand_verifier
+from shared.nodes import WORLD
 from shared.process import StatusReporter, add_process_arguments, explain, prepare_process
 
 
@@ -33,20 +34,13 @@ def main() -> int:
         scenario = load_scenario(arguments.scenario, arguments.set)
         setup = plan_world(scenario)
         radio = Radio(setup.address, setup.fleet.ids, setup.hovers)
-        listen = endpoint(scenario, setup.formation, WORLD)
-        connect = dials(scenario, setup.formation, WORLD)
-        bus = ZenohBus(
-            scenario.swarm.name,
-            listen,
-            connect,
-            adminspace=scenario.net.adminspace,
-            client=scenario.net.router is not None,
-        )
+        verify = hand_verifier(scenario.net)
+        bus = join(scenario, setup.formation, WORLD, audited=True)
     except SwarmTouchError as error:
         return explain("world", error)
     clock = system_clock()
     with radio, bus, RefereeFile(arguments.run_dir) as report:
-        hand, status = HandWatch(bus, clock), StatusReporter(bus, WORLD, 0, clock)
+        hand, status = HandWatch(bus, clock, verify), StatusReporter(bus, WORLD, 0, clock)
         world = World(setup.fleet, radio, setup.rules, time.monotonic())
         while not stopping.wait(max(0.0, world.next_tick - time.monotonic())):
             world.run_until(time.monotonic(), hand.position())

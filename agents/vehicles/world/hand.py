@@ -7,6 +7,7 @@ import numpy as np
 from agents.vehicles.bodies.state import Vec
 from shared.clock import Clock
 from shared.senses import Senses
+from shared.signature import Verify
 from shared.transport import Bus, Inbox
 
 
@@ -16,11 +17,12 @@ class HandWatch:
     Args:
         bus: Where `human/hand` is published.
         clock: Stamps arrivals.
+        verify: Checks signatures; None accepts unsigned samples.
     """
 
-    def __init__(self, bus: Bus, clock: Clock) -> None:
+    def __init__(self, bus: Bus, clock: Clock, verify: Verify | None = None) -> None:
         self._inbox = Inbox(clock)
-        self._senses = Senses(ids=())
+        self._senses = Senses((), verify)
         for key in self._senses.keys:
             bus.subscribe(key, self._inbox)
 

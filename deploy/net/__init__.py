@@ -1,0 +1,1 @@
+"""Keys of a swarm, and Zenoh's configuration written out for any node."""

@@ -1,0 +1,1 @@
+"""How a node is configured on the network: one generator for every profile, pure dictionaries for Zenoh."""

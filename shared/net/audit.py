@@ -1,0 +1,103 @@
+"""Who is linked to this node, and who was refused (DESIGN section 8).
+
+Zenoh tells of links as events, but of refusals only in its own log, in the words below. The log names a node by
+its Zenoh identity, the link by the name in its certificate.
+"""
+
+import re
+import threading
+from collections import Counter
+from collections.abc import Iterable
+
+from shared.clock import NS_PER_S
+
+LOG_FILTER = (
+    "error,zenoh::net::routing::interceptor::access_control=trace,zenoh_link_commons=warn,zenoh_link_tls=warn"
+)
+"""Zenoh's log level under which refusals are told."""
+REPORT_NS = NS_PER_S
+"""Refusals are logged at most this often."""
+MAX_NAMES = 16
+"""Names are chosen by whoever knocks: more than this many are counted together."""
+MAX_IDENTITIES = 256
+OTHERS = "others"
+STRANGER = "a node without a certificate of ours"
+
+_DENIED = re.compile(
+    r"(cached result: )?([0-9a-f]{1,32}) (?:on \S+ )?is unauthorized to (Put|Delete) \(ingress\) on (\S+)"
+)
+_REJECTED = re.compile(r"acceptor failed.*?(peer sent no certificates|invalid peer certificate: \w+)")
+
+
+class Audit:
+    """Counts; thread-safe, because links, log and status live on different threads.
+
+    Args:
+        members: Who belongs to the swarm, by the name in the certificate.
+    """
+
+    def __init__(self, members: Iterable[str]) -> None:
+        self._members = frozenset(members)
+        self._lock = threading.Lock()
+        self._names: dict[str, str] = {}
+        self._present: set[str] = set()
+        self._refused: Counter[str] = Counter()
+        self._told: Counter[str] = Counter()
+        self._told_ns = 0
+
+    def linked(self, identity: str, name: str | None, *, present: bool) -> None:
+        """Takes in that a link has come up or gone.
+
+        Args:
+            identity: Zenoh identity of the other node.
+            name: Common name of its certificate, None without one.
+            present: Whether the link is there.
+        """
+        name = name or STRANGER
+        with self._lock:
+            if not present:
+                self._present.discard(identity)
+                return
+            is_new = identity not in self._present
+            self._present.add(identity)
+            self._remember(identity, name)
+            if is_new and name not in self._members:
+                self._count(name)
+
+    def read(self, text: str) -> None:
+        """Takes in a piece of Zenoh's log, whole lines."""
+        if "unauthorized" not in text and "acceptor failed" not in text:
+            return
+        with self._lock:
+            denied = _DENIED.findall(text)
+            # The first decision on a key is told once per network interface, each later one just once.
+            for _, identity, verb, key in [d for d in denied if d[0]] + sorted({d for d in denied if not d[0]}):
+                self._count(f"{self._names.get(identity, identity)} {verb.lower()} {key}")
+            for reason in _REJECTED.findall(text):
+                self._count(f"{STRANGER} ({reason})")
+
+    def report(self, now_ns: int) -> str | None:
+        """Returns one line about what was refused since the last report, None if nothing or too early."""
+        with self._lock:
+            if now_ns - self._told_ns < REPORT_NS or self._told == self._refused:
+                return None
+            news = self._refused - self._told
+            self._told, self._told_ns = self._refused.copy(), now_ns
+        return ", ".join(f"{who} ({n} times)" for who, n in news.items())
+
+    def metrics(self) -> dict[str, float]:
+        """Returns who is linked and how often whom was refused, as numbers for a process's status."""
+        with self._lock:
+            links = Counter(self._names.get(identity, STRANGER) for identity in self._present)
+            named = {f"linked {name}": float(n) for name, n in links.most_common(MAX_NAMES)}
+            return named | {f"refused {who}": float(n) for who, n in self._refused.items()}
+
+    def _remember(self, identity: str, name: str) -> None:
+        """Keeps the name beyond the end of the link: the log tells of it a little later."""
+        self._names.pop(identity, None)
+        self._names[identity] = name
+        if len(self._names) > MAX_IDENTITIES:
+            del self._names[next(iter(self._names))]
+
+    def _count(self, who: str) -> None:
+        self._refused[who if who in self._refused or len(self._refused) < MAX_NAMES else OTHERS] += 1
