@@ -9,7 +9,7 @@ BIN := .venv/bin
 RUNTIME := .venv/.runtime
 DEVELOPMENT := .venv/.development
 
-.PHONY: help demo env test check lint clean
+.PHONY: help demo env test check lint chaos clean
 
 help:  ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
@@ -32,6 +32,9 @@ lint: $(DEVELOPMENT)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+chaos: $(DEVELOPMENT)  ## as root: kill, freeze, part and flood a swarm in network namespaces; one table
+	$(BIN)/python -m tests.chaos --csv runs/chaos.csv
 
 clean:  ## remove what was set up and cached; flights in runs/ stay
 	rm -rf .bootstrap .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
