@@ -17,7 +17,7 @@ import socket, time
 with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
     ear.bind(("", 9000))
     print("ready", flush=True)
-    ear.settimeout(1.5)
+    ear.settimeout(0.7)
     try:
         while True:
             datagram = ear.recv(100)
