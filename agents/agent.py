@@ -1,19 +1,18 @@
 """One drone's brain without I/O: bytes and time in, state out. The process loop and the simulator drive it."""
 
-from collections.abc import Mapping, Sequence
-from typing import cast
+from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-
-from agents.control.avoidance import Encounters
 from agents.control.hand import HandInput
 from agents.control.modes import HAND_STALE
-from agents.control.step import REFERENCE_LOST, Inputs, Reference, Settings, State, start, step
+from agents.control.single.avoidance import Encounter
+from agents.control.single.repair import REFERENCE_LOST, Reference
+from agents.control.single.steering import Bystander
+from agents.control.step import Inputs, Settings, State, start, step
 from agents.stepping import due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
-from shared.formation import Formation, Vec
-from shared.messages import NO_HAND, DroneState, HandSample, Heard, Vector
+from shared.formation import Formation
+from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard
 from shared.net.keyring import hand_verifier
 from shared.nodes import neighbours
 from shared.scenario import Scenario
@@ -23,6 +22,13 @@ from shared.transport import Arrival
 
 NEVER = float("inf")
 HAND_KEY = HAND.key()
+
+SILENT_AFTER = 0.1
+"""A drone unheard for this long is kept away from more and more, s ..."""
+SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
+"""... from this distance on, growing at this rate, up to this, m and m/s."""
+FORGOTTEN_AFTER = 5.0
+"""After this long its body is no longer in the air, s."""
 
 
 class Agent:
@@ -39,11 +45,12 @@ class Agent:
     def __init__(
         self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
     ) -> None:
-        self.senses = Senses(neighbours(formation, drone), hand_verifier(scenario.net))
+        self.senses = Senses(neighbours(scenario, formation, drone), hand_verifier(scenario.net))
         self.steps = 0
         self._drone = drone
         self._epoch = epoch
         self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
+        self._kin = {kin.drone: DRONE_STATE.key(id=kin.drone) for kin in settings.kin}
         self._settings = settings
         self._rule = step_rule(scenario.rates)
         self._nominal_dt = 1.0 / scenario.rates.control_hz
@@ -75,11 +82,10 @@ class Agent:
         Returns:
             The state to publish; its set-point and mode are for the vehicle. The caller sets `stamp_ns`.
         """
-        position, velocity = np.array(pose.position), np.array(pose.velocity)
         if self._state is None:
-            self._state = start(position, self._settings, airborne=pose.airborne)
+            self._state = start(pose.position, self._settings, airborne=pose.airborne)
         dt = (now_ns - self._last_step_ns) / NS_PER_S if self.steps else self._nominal_dt
-        inputs = self._inputs(now_ns, position, velocity, pose_age)
+        inputs = self._inputs(now_ns, pose, pose_age)
         self._state, output = step(self._state, inputs, self._settings, dt)
         self._used = self._heard()
         self._last_step_ns = now_ns
@@ -90,13 +96,13 @@ class Agent:
             id=self._drone,
             position=pose.position,
             velocity=pose.velocity,
-            goal=_vector(output.goal),
-            goal_velocity=_vector(output.goal_velocity),
-            setpoint=_vector(output.setpoint),
+            goal=output.goal,
+            goal_velocity=output.goal_velocity,
+            setpoint=output.setpoint,
             mode=self._state.mode.mode,
             displacements={
-                link.name: _vector(x)
-                for link, x in zip(self._settings.rows.links, self._state.links.displacement, strict=True)
+                link.name: moved.displacement
+                for link, moved in zip(self._settings.row.links, self._state.links, strict=True)
             },
             pose_age=pose_age,
             battery=pose.battery,
@@ -129,18 +135,20 @@ class Agent:
         used = self._used.get(key)
         return used is None or (used.epoch, used.seq) != (sensed.message.epoch, sensed.message.seq)
 
-    def _inputs(self, now_ns: int, position: Vec, velocity: Vec, pose_age: float) -> Inputs:
+    def _inputs(self, now_ns: int, pose: Pose, pose_age: float) -> Inputs:
         hand = self.senses.hand
         return Inputs(
-            position=position,
-            velocity=velocity,
+            position=pose.position,
+            velocity=pose.velocity,
             pose_age=pose_age,
+            battery=pose.battery,
             hand=None if hand is None or hand.message.position == NO_HAND else hand_input(hand.message),
             wish=None if hand is None else hand.message.mode,
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
-            references=tuple(self._reference(other, key, now_ns) for other, key in self._references.items()),
-            drones=_encounters(list(self.senses.drones.values()), now_ns),
+            references=tuple(self._reference(other, key, now_ns) for other, key in self._kin.items()),
+            drones=_encounters(self.senses.drones.values(), now_ns),
+            silent=_bystanders(self.senses.drones.values(), now_ns),
         )
 
     def _reference(self, other: int, key: str, now_ns: int) -> Reference | None:
@@ -149,18 +157,19 @@ class Agent:
             return None
         state, stable = sensed.message, self._settings.stable
         return Reference(
-            point=np.array(state.goal if stable else state.position),
-            velocity=np.array(state.goal_velocity if stable else state.velocity),
-            goal_velocity=np.array(state.goal_velocity),
+            point=state.goal if stable else state.position,
+            velocity=state.goal_velocity if stable else state.velocity,
+            goal_velocity=state.goal_velocity,
             mode=state.mode,
             age=sensed.age(now_ns),
             fresh=self._is_fresh(key, sensed),
         )
 
     def _heard(self) -> dict[str, Heard]:
-        """Returns what this step used: the hand and the references."""
+        """Returns what this step used: the hand, the references, and who stands behind one that is gone."""
         heard = {} if self.senses.hand is None else {HAND_KEY: self.senses.hand.heard}
-        for other, key in self._references.items():
+        repaired = self._state is not None and any(each.share > 0.0 for each in self._state.stand_ins)
+        for other, key in (self._kin if repaired else self._references).items():
             if other in self.senses.drones:
                 heard[key] = self.senses.drones[other].heard
         return heard
@@ -174,26 +183,33 @@ def _has_used(state: DroneState, hand: HandSample) -> bool:
 def hand_input(sample: HandSample) -> HandInput:
     """Returns a sample as the control law takes it."""
     return HandInput(
-        position=np.array(sample.position),
-        velocity=np.array(sample.velocity),
+        position=sample.position,
+        velocity=sample.velocity,
         yaw=sample.yaw,
         # Counted from the relay's start: seconds since 1970 would leave a float with a quarter microsecond.
         stamp=(sample.stamp_ns - sample.epoch) / NS_PER_S,
     )
 
 
-def _encounters(drones: Sequence[Sensed[DroneState]], now_ns: int) -> Encounters:
-    """Returns where the other drones are; a silent one stays there, but no longer comes closer."""
-    live = [sensed.age(now_ns) <= DRONE_STATE.stale_s for sensed in drones]
-    velocity = [
-        s.message.velocity[:2] if is_live else (0.0, 0.0) for s, is_live in zip(drones, live, strict=True)
-    ]
-    return Encounters(
-        row=np.zeros(len(drones), dtype=np.intp),
-        position=np.array([sensed.message.position[:2] for sensed in drones]).reshape(-1, 2),
-        velocity=np.array(velocity).reshape(-1, 2),
-    )
+def _bystanders(drones: Iterable[Sensed[DroneState]], now_ns: int) -> list[Bystander]:
+    """Returns who has fallen silent: a body that may drift or fall, for as long as it may be in the air."""
+    found = []
+    for sensed in drones:
+        age = sensed.age(now_ns)
+        if SILENT_AFTER < age <= FORGOTTEN_AFTER:
+            x, y, _ = sensed.message.position
+            radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
+            found.append(Bystander(x, y, radius))
+    return found
 
 
-def _vector(array: Vec) -> Vector:
-    return cast(Vector, tuple(array.tolist()))
+def _encounters(drones: Iterable[Sensed[DroneState]], now_ns: int) -> list[Encounter]:
+    """Returns where the other drones are; a silent one stays there for a while, but comes no closer."""
+    found = []
+    for sensed in drones:
+        if sensed.age(now_ns) > FORGOTTEN_AFTER:
+            continue
+        x, y, _ = sensed.message.position
+        u, v, _ = sensed.message.velocity if sensed.age(now_ns) <= DRONE_STATE.stale_s else ORIGIN
+        found.append((x, y, u, v))
+    return found

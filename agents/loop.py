@@ -3,9 +3,8 @@
 import logging
 import threading
 
-from attrs import evolve
-
 from agents.agent import Agent
+from agents.control.modes import POSE_LOST
 from agents.vehicles.base import Pose, Vehicle
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
@@ -76,7 +75,7 @@ def run(
             continue
         state = agent.step(now, *seen)
         command(vehicle, state)
-        publish(encode(evolve(state, stamp_ns=clock())))
+        publish(encode(state, clock()))
         if state.mode is not mode:
             _log.info("%s at height %.2f m (%s)", state.mode, state.position[2], state.flags.name or "no flags")
             mode = state.mode
@@ -89,5 +88,7 @@ def command(vehicle: Vehicle, state: DroneState) -> None:
         vehicle.stop()
     elif state.mode is Mode.GROUND:
         vehicle.idle()
+    elif state.pose_age > POSE_LOST:
+        vehicle.descend()
     else:
         vehicle.fly(state.setpoint)

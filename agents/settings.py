@@ -2,8 +2,11 @@
 
 import numpy as np
 
-from agents.control.goals import agent_row
 from agents.control.hand import HandSettings
+from agents.control.single.goals import drone_row
+from agents.control.single.repair import Kin, kin_order
+from agents.control.single.steering import SteeringSettings as SingleSteeringSettings
+from agents.control.single.vectors import vector
 from agents.control.steering import SteeringSettings
 from agents.control.step import Settings
 from shared.config import vehicle_settings
@@ -17,11 +20,12 @@ UNLIMITED = 1e3
 def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Settings:
     """Returns the settings of one drone."""
     return Settings(
-        rows=agent_row(formation, drone),
+        row=drone_row(formation, drone),
         hand=hand_settings(scenario, formation),
-        steering=steering_settings(scenario, formation, (drone,)),
+        steering=single_steering_settings(scenario, formation, drone),
         stable=scenario.swarm.law == "stable",
         reference_heights=_reference_heights(scenario, formation, drone),
+        kin=_kin(scenario, formation, drone),
         takeoff_height=scenario.limits.takeoff_height,
         takeoff_speed=scenario.limits.takeoff_speed,
         landing_speed=scenario.limits.landing_speed,
@@ -40,7 +44,22 @@ def hand_settings(scenario: Scenario, formation: Formation) -> HandSettings:
         high = np.array([*hand.clip.max, UNLIMITED])
     else:
         low, high = _mapped_hand_box(scenario, formation)
-    return HandSettings(hand=hand, low=low, high=high, radius=formation.radius)
+    return HandSettings(hand=hand, low=vector(low), high=vector(high), radius=formation.radius)
+
+
+def single_steering_settings(scenario: Scenario, formation: Formation, drone: int) -> SingleSteeringSettings:
+    """Returns the steering settings of one drone."""
+    low, high = _goal_box(scenario, formation)
+    return SingleSteeringSettings(
+        limits=scenario.limits,
+        avoidance=scenario.avoidance,
+        columns=tuple((o.x, o.y) for o in scenario.obstacles),
+        low=vector(low),
+        high=vector(high),
+        tau=_tau(scenario, drone),
+        always_lead=scenario.swarm.law == "stable",
+        lead_above=scenario.hand.max_speed,
+    )
 
 
 def steering_settings(scenario: Scenario, formation: Formation, drones: tuple[int, ...]) -> SteeringSettings:
@@ -52,16 +71,33 @@ def steering_settings(scenario: Scenario, formation: Formation, drones: tuple[in
         columns=np.array([(o.x, o.y) for o in scenario.obstacles]).reshape(-1, 2),
         low=low,
         high=high,
-        tau=np.array([[vehicle_settings(scenario, drone).tau] for drone in drones], dtype=np.float64),
+        tau=np.array([[_tau(scenario, drone)] for drone in drones]),
         always_lead=scenario.swarm.law == "stable",
         lead_above=scenario.hand.max_speed,
     )
 
 
-def _reference_heights(scenario: Scenario, formation: Formation, drone: int) -> Vec | None:
+def _tau(scenario: Scenario, drone: int) -> float:
+    return float(vehicle_settings(scenario, drone).tau)  # type: ignore[arg-type]  # resolved: never None
+
+
+def _reference_heights(scenario: Scenario, formation: Formation, drone: int) -> tuple[float, ...] | None:
     if scenario.swarm.law == "stable" or scenario.formation.height_from == "references":
         return None
-    return np.array([formation.rest[formation.row(other), 2] for other in formation.references(drone)])
+    return tuple(float(formation.rest[formation.row(other), 2]) for other in formation.references(drone))
+
+
+def _kin(scenario: Scenario, formation: Formation, drone: int) -> tuple[Kin, ...]:
+    order = kin_order({each: formation.references(each) for each in formation.ids}, drone)
+    return tuple(
+        Kin(
+            drone=each,
+            row=drone_row(formation, each),
+            references=tuple(order.index(other) for other in formation.references(each)),
+            heights=_reference_heights(scenario, formation, each),
+        )
+        for each in order
+    )
 
 
 def _goal_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:

@@ -98,8 +98,11 @@ class ZenohBus:
         def store(sample: zenoh.Sample) -> None:
             inbox.put(str(sample.key_expr), sample.payload.to_bytes())
 
+        # On Zenoh's own thread: handing over to a Python thread per subscription would cost a wake-up each.
+        handler = zenoh.handlers.Callback(store, indirect=False)
         for session in self._sessions:
-            self._declared.append(session.declare_subscriber(key_expression, store, allowed_origin=_OTHERS))
+            subscriber = session.declare_subscriber(key_expression, handler, allowed_origin=_OTHERS)
+            self._declared.append(subscriber)
 
     def announce(self, role: str, number: int) -> None:
         """See `Bus.announce`."""

@@ -5,10 +5,12 @@ Unknown extra fields are ignored (a newer publisher may say more), a missing or 
 """
 
 import enum
+import functools
 import math
 from collections.abc import Callable
-from typing import Annotated, Any, TypeVar, get_args, get_origin
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
+import attrs
 import msgpack
 from cattrs import Converter
 
@@ -24,17 +26,27 @@ Hook = Callable[[Any, Any], Any]
 _KNOWN_FLAGS = sum(Flag)
 
 
-def encode(message: Message) -> bytes:
+def encode(message: Message, stamp_ns: int | None = None) -> bytes:
     """Encodes a message as one MessagePack map with its schema version.
 
     Args:
         message: Any of the types in `shared.messages`.
+        stamp_ns: Replaces the stamp of the message, for a publisher that stamps at the last moment.
 
     Returns:
         The payload; the same message always gives the same bytes.
     """
     # The version comes first and the fields keep their order: a signature is the end of the payload.
-    return bytes(msgpack.packb({"v": SCHEMA_VERSION, **_converter.unstructure(message)}))
+    fields = {"v": SCHEMA_VERSION}
+    fields |= {name: getattr(message, name) for name in _field_names(cast(Any, type(message)))}
+    if stamp_ns is not None:
+        fields["stamp_ns"] = stamp_ns
+    return bytes(msgpack.packb(fields))
+
+
+@functools.cache
+def _field_names(kind: Any) -> tuple[str, ...]:
+    return tuple(attribute.name for attribute in attrs.fields(kind))
 
 
 def decode(payload: bytes, kind: type[M]) -> M:
@@ -53,7 +65,7 @@ def decode(payload: bytes, kind: type[M]) -> M:
     if len(payload) > MAX_PAYLOAD:
         raise DecodeError("oversized", f"{len(payload)} bytes, at most {MAX_PAYLOAD}")
     try:
-        fields = msgpack.unpackb(payload)
+        fields = msgpack.unpackb(payload, use_list=False)
     except Exception as error:
         raise DecodeError("malformed", type(error).__name__) from error
     if type(fields) is not dict:
@@ -62,13 +74,18 @@ def decode(payload: bytes, kind: type[M]) -> M:
     if type(version) is not int or version != SCHEMA_VERSION:
         raise DecodeError("version", f"schema {version!r}, this process speaks {SCHEMA_VERSION}")
     try:
-        return _converter.structure(fields, kind)
+        return cast(M, _structure_hook(cast(Any, kind))(fields, kind))
     except DecodeError:
         raise
     except KeyError as error:
         raise DecodeError("missing-field", str(error)) from error
     except Exception as error:
         raise DecodeError("wrong-type", f"{type(error).__name__}: {error}") from error
+
+
+@functools.cache
+def _structure_hook(kind: Any) -> Hook:
+    return _converter.get_structure_hook(kind)
 
 
 def _integer(value: Any, _: Any = int) -> int:
@@ -97,19 +114,30 @@ def _binary(value: Any, _: Any = bytes) -> bytes:
     return value
 
 
-def _flags(value: Any, kind: type[enum.IntFlag]) -> enum.IntFlag:
+def _flags(value: Any, _: Any) -> Flag:
     bits = _integer(value)
     if bits < 0 or bits > 0xFFFF_FFFF:
         raise DecodeError("out-of-range", f"flags {bits}")
     # A newer publisher may set flags that we do not know: keep those that we do.
-    return kind(bits & _KNOWN_FLAGS)
+    return _known_flags(bits & _KNOWN_FLAGS)
 
 
-def _word(value: Any, kind: type[enum.StrEnum]) -> enum.StrEnum:
-    try:
-        return kind(_text(value))
-    except ValueError as error:
-        raise DecodeError("out-of-range", str(error)) from error
+@functools.cache
+def _known_flags(bits: int) -> Flag:
+    return Flag(bits)
+
+
+def _word_hook(kind: type[enum.StrEnum]) -> Hook:
+    """Makes the hook of an enumeration of words."""
+    words = {word.value: word for word in kind}
+
+    def word(value: Any, _: Any) -> enum.StrEnum:
+        found = words.get(value) if type(value) is str else None
+        if found is None:
+            raise DecodeError("out-of-range", f"{_text(value)!r:.40} is none of {', '.join(words)}")
+        return found
+
+    return word
 
 
 def _ranged_hook(annotated: Any) -> Hook:
@@ -127,7 +155,7 @@ def _ranged_hook(annotated: Any) -> Hook:
         return checked
 
     def vector(value: Any, _: Any) -> tuple[float, ...]:
-        if type(value) is not list or len(value) != 3:
+        if type(value) is not tuple or len(value) != 3:
             raise DecodeError("wrong-type", f"three numbers are expected, not {value!r:.40}")
         x, y, z = value
         if (
@@ -136,37 +164,55 @@ def _ranged_hook(annotated: Any) -> Hook:
             and low <= y <= high
             and low <= z <= high
         ):
-            return (x, y, z)
+            return value
         return (number(x, float), number(y, float), number(z, float))
 
     return vector if get_origin(base) is tuple else number
 
 
 def _heard(value: Any, _: Any) -> Heard:
-    if type(value) is not list or len(value) != 3:
+    if type(value) is not tuple or len(value) != 3:
         raise DecodeError("wrong-type", f"(epoch, seq, arrival) is expected, not {value!r:.40}")
-    epoch, seq, arrival_ns = value
-    return Heard(_unsigned(epoch, int), _unsigned(seq, int), _unsigned(arrival_ns, int))
+    for number in value:
+        _unsigned(number, int)
+    return Heard._make(value)
 
 
 def _sequence_hook(kind: Any) -> Hook:
     """Makes the hook of a `tuple[element, ...]`; bytes and maps can be iterated too, but are none."""
     element = get_args(kind)[0]
+    hook = _converter.get_structure_hook(element)
 
-    def hook(value: Any, _: Any) -> tuple[Any, ...]:
-        if type(value) is not list:
+    def sequence(value: Any, _: Any) -> tuple[Any, ...]:
+        if type(value) is not tuple:
             raise DecodeError("wrong-type", f"a list is expected, not {value!r:.40}")
-        return tuple(_converter.structure(item, element) for item in value)
+        return tuple([hook(item, element) for item in value])
 
-    return hook
+    return sequence
+
+
+def _mapping_hook(kind: Any) -> Hook:
+    """Makes the hook of a `dict[str, element]`."""
+    element = get_args(kind)[1]
+    hook = _converter.get_structure_hook(element)
+
+    def mapping(value: Any, _: Any) -> dict[str, Any]:
+        if type(value) is not dict:
+            raise DecodeError("wrong-type", f"a map is expected, not {value!r:.40}")
+        return {_text(key): hook(item, element) for key, item in value.items()}
+
+    return mapping
 
 
 _unsigned = _ranged_hook(UInt64)
 
 
 def _is_sequence(kind: Any) -> bool:
-    origin: Any = get_origin(kind)
-    return origin is tuple
+    return get_origin(kind) is tuple
+
+
+def _is_mapping(kind: Any) -> bool:
+    return get_origin(kind) is dict
 
 
 def _is_ranged(kind: Any) -> bool:
@@ -181,12 +227,12 @@ def _make_converter() -> Converter:
     converter.register_structure_hook(bytes, _binary)
     converter.register_structure_hook_factory(_is_ranged, _ranged_hook)
     converter.register_structure_hook_factory(_is_sequence, _sequence_hook)
+    converter.register_structure_hook_factory(_is_mapping, _mapping_hook)
     converter.register_structure_hook_func(lambda kind: kind is Heard, _heard)
     # By class, because a hook for `str` or `int` would also take their subclasses and leave a bare string.
     converter.register_structure_hook(Flag, _flags)
-    for word in (Wish, Mode):
-        converter.register_structure_hook(word, _word)
-    converter.register_unstructure_hook(Heard, list)
+    for words in (Wish, Mode):
+        converter.register_structure_hook(words, _word_hook(words))
     return converter
 
 

@@ -4,12 +4,14 @@ A formation is a matrix with rows >= 0 and sum 1 over `[human, drone 1, ..., dro
 The reference graph must be a DAG rooted at the human.
 """
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 from attrs import field, frozen
 
+from shared.cells import near_pairs
 from shared.errors import ConfigError
 from shared.scenario import Drone, Impedance, Scenario
 from shared.shapes import HUMAN, generate
@@ -126,7 +128,8 @@ def build_formation(scenario: Scenario, origin: str = "scenario") -> Formation:
     where = f"{origin}: at key formation"
     _check_ids(drones, scenario, where)
     ids = tuple(drone.id for drone in drones)
-    weights = np.array([_weight_row(drone, ids, where) for drone in drones])
+    columns = {HUMAN: 0} | {str(number): column for column, number in enumerate(ids, start=1)}
+    weights = np.array([_weight_row(drone, columns, where) for drone in drones])
     offsets = np.array([drone.offset for drone in drones], dtype=np.float64)
     levels = _levels(weights, ids, where)
     if scenario.swarm.law == "paper" and len(levels) > PAPER_MAX_DEPTH:
@@ -136,7 +139,7 @@ def build_formation(scenario: Scenario, origin: str = "scenario") -> Formation:
         )
     rest = _rest_shape(weights, offsets, levels)
     _check_distances(rest, ids, scenario.limits.safety_distance, where)
-    links = _build_links(scenario, drones, ids, where)
+    links = _build_links(scenario, drones, columns, where)
     return Formation(
         ids=ids,
         weights=weights,
@@ -152,43 +155,43 @@ def _check_ids(drones: Sequence[Drone], scenario: Scenario, where: str) -> None:
     ids = [drone.id for drone in drones]
     if not ids:
         raise ConfigError(f"{where}.drones: no drones; list [[formation.drones]] or choose a shape")
-    for number in ids:
-        if ids.count(number) > 1:
-            raise ConfigError(f"{where}.drones: id {number} appears {ids.count(number)} times; ids are unique")
+    for number, times in Counter(ids).items():
+        if times > 1:
+            raise ConfigError(f"{where}.drones: id {number} appears {times} times; ids are unique")
     for robot in scenario.vehicles.robots:
         if robot not in map(str, ids):
             raise ConfigError(f"{where}: vehicles.robots.{robot} names no drone of the formation {ids}")
 
 
-def _weight_row(drone: Drone, ids: tuple[int, ...], where: str) -> Vec:
+def _weight_row(drone: Drone, columns: Mapping[str, int], where: str) -> Vec:
     where = f"{where}.drones, drone {drone.id}"
     if not drone.references:
         raise ConfigError(f'{where}: no references; refer to "human" or to another drone')
     weights = drone.weights or (1.0 / len(drone.references),) * len(drone.references)
     if len(weights) != len(drone.references) or min(weights) < 0 or abs(sum(weights) - 1.0) > 1e-9:
         raise ConfigError(f"{where}: weights {weights} must be >= 0, one per reference, with sum 1")
-    row = np.zeros(len(ids) + 1)
+    row = np.zeros(len(columns))
     for reference, weight in zip(drone.references, weights, strict=True):
-        row[_column(reference, ids, where)] += weight
+        row[_column(reference, columns, where)] += weight
     return row
 
 
-def _column(reference: str, ids: tuple[int, ...], where: str) -> int:
+def _column(reference: str, columns: Mapping[str, int], where: str) -> int:
     """Returns the column of a reference in `[human, drones...]`."""
-    if reference == HUMAN:
-        return 0
-    if reference.isdecimal() and int(reference) in ids:
-        return 1 + ids.index(int(reference))
-    raise ConfigError(f'{where}: {reference!r} is neither "human" nor a drone of {list(ids)}')
+    if reference not in columns:
+        known = [int(name) for name in columns if name != HUMAN]
+        raise ConfigError(f'{where}: {reference!r} is neither "human" nor a drone of {known}')
+    return columns[reference]
 
 
 def _levels(weights: Vec, ids: tuple[int, ...], where: str) -> tuple[tuple[int, ...], ...]:
     """Sorts the rows by depth (Kahn); whatever never becomes ready is in, or behind, a cycle."""
     levels: list[tuple[int, ...]] = []
     placed: set[int] = set()
+    references = [frozenset(np.flatnonzero(row[1:]).tolist()) for row in weights]
     waiting = set(range(len(ids)))
     while waiting:
-        ready = tuple(sorted(row for row in waiting if set(np.flatnonzero(weights[row, 1:])) <= placed))
+        ready = tuple(sorted(row for row in waiting if references[row] <= placed))
         if not ready:
             stuck = sorted(ids[row] for row in waiting)
             raise ConfigError(
@@ -210,33 +213,34 @@ def _rest_shape(weights: Vec, offsets: Vec, levels: tuple[tuple[int, ...], ...])
 
 
 def _check_distances(rest: Vec, ids: tuple[int, ...], smallest: float, where: str) -> None:
-    gaps = np.linalg.norm(rest[:, None, :2] - rest[None, :, :2], axis=2)
-    np.fill_diagonal(gaps, np.inf)
-    first, second = np.unravel_index(np.argmin(gaps), gaps.shape)
-    if gaps[first, second] < smallest:
+    first, second = near_pairs(rest[:, :2], np.zeros(len(rest), dtype=np.intp), smallest)
+    gaps = np.linalg.norm(rest[first, :2] - rest[second, :2], axis=1)
+    if gaps.size and gaps.min() < smallest:
+        nearest = int(np.argmin(gaps))
+        one, other = sorted((ids[first[nearest]], ids[second[nearest]]))
         raise ConfigError(
-            f"{where}: drones {ids[first]} and {ids[second]} rest {gaps[first, second]:.3f} m apart, nearer"
+            f"{where}: drones {one} and {other} rest {gaps[nearest]:.3f} m apart, nearer"
             f" than limits.safety_distance = {smallest} m; widen spacing, width or their offsets"
         )
 
 
 def _build_links(
-    scenario: Scenario, drones: Sequence[Drone], ids: tuple[int, ...], where: str
+    scenario: Scenario, drones: Sequence[Drone], columns: Mapping[str, int], where: str
 ) -> tuple[Link, ...]:
     names = scenario.formation.links
     if names is None:
         names = tuple(f"{reference}-{drone.id}" for drone in drones for reference in drone.references)
-    for name in names:
-        if names.count(name) > 1:
-            raise ConfigError(f"{where}.links: {name!r} appears {names.count(name)} times; a link is unique")
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise ConfigError(f"{where}.links: {name!r} appears {times} times; a link is unique")
     special = {settings.name: settings for settings in scenario.impedance.links}
     for name in special:
         if name not in names:
             raise ConfigError(f"{where}: impedance.links names {name!r}, the links are {list(names)}")
-    return tuple(_build_link(name, scenario.impedance, special.get(name), ids, where) for name in names)
+    return tuple(_build_link(name, scenario.impedance, special.get(name), columns, where) for name in names)
 
 
-def _build_link(name: str, default: Impedance, special: object, ids: tuple[int, ...], where: str) -> Link:
+def _build_link(name: str, default: Impedance, special: object, columns: Mapping[str, int], where: str) -> Link:
     source, separator, target = name.partition("-")
     where = f"{where}.links, {name!r}"
     if not separator or target == HUMAN:
@@ -248,8 +252,8 @@ def _build_link(name: str, default: Impedance, special: object, ids: tuple[int, 
 
     link = Link(
         name=name,
-        source=_column(source, ids, where),
-        target=_column(target, ids, where) - 1,
+        source=_column(source, columns, where),
+        target=_column(target, columns, where) - 1,
         mass=value("mass"),
         damping=value("damping"),
         stiffness=value("stiffness"),

@@ -15,8 +15,6 @@ OBSERVER = "observer"
 
 NEAR = 1.5
 """Drones that rest within this distance link to each other, m."""
-FULL_MESH = 16
-"""Up to this many drones everyone links to everyone."""
 
 
 def drone_node(drone: int) -> str:
@@ -54,23 +52,26 @@ def dials(scenario: Scenario, formation: Formation, node: str) -> list[str]:
         return [scenario.net.router]
     nodes = all_nodes(formation)
     earlier = nodes[: nodes.index(node)]
-    return [endpoint(scenario, formation, other) for other in earlier if _linked(formation, node, other)]
+    # On a radio the relay has no link to dial; its samples are in the air.
+    absent = {RELAY} if scenario.net.profile == "radio" else set()
+    linked = [other for other in earlier if other not in absent and _linked(scenario, formation, node, other)]
+    return [endpoint(scenario, formation, other) for other in linked]
 
 
-def neighbours(formation: Formation, drone: int) -> tuple[int, ...]:
+def neighbours(scenario: Scenario, formation: Formation, drone: int) -> tuple[int, ...]:
     """Returns the drones that one hears: all of a small swarm, else its ancestors and those near it."""
-    if len(formation.ids) <= FULL_MESH:
+    if len(formation.ids) <= scenario.net.full_mesh:
         return tuple(other for other in formation.ids if other != drone)
     gaps = np.linalg.norm(formation.rest - formation.rest[formation.row(drone)], axis=1)
     near = {other for other, gap in zip(formation.ids, gaps, strict=True) if gap <= NEAR}
     return tuple(sorted((near | set(formation.ancestors(drone))) - {drone}))
 
 
-def _linked(formation: Formation, node: str, earlier: str) -> bool:
+def _linked(scenario: Scenario, formation: Formation, node: str, earlier: str) -> bool:
     if WORLD in (node, earlier):
         # The world stands for physics, not for a member: it hears the hand (as the referee) and is observed.
         return RELAY in (node, earlier) or OBSERVER in (node, earlier)
     if not (node.startswith("drone/") and earlier.startswith("drone/")):
         return True
     one, other = int(node.removeprefix("drone/")), int(earlier.removeprefix("drone/"))
-    return other in neighbours(formation, one) or one in neighbours(formation, other)
+    return other in neighbours(scenario, formation, one) or one in neighbours(scenario, formation, other)

@@ -237,6 +237,9 @@ class VehicleSettings:
         body: Simulated body: `identified` or `crazyflie`.
         link_loss: What a simulated body does without commands: `crazyflie` or `hover`.
         tau: Lag of the vehicle that the `stable` law leads by, s.
+        battery: Fault of a simulated vehicle: its charge at the start, 0..1.
+        endurance: The same: flying time from full to empty, s; absent: its battery never drains.
+        pose_silence: The same: (start, length) of a time without poses, s from the start of the world.
     """
 
     type: str | None = None
@@ -244,6 +247,9 @@ class VehicleSettings:
     body: Literal["identified", "crazyflie"] | None = None
     link_loss: Literal["crazyflie", "hover"] | None = None
     tau: float | None = field(default=None, validator=optional(_not_negative))
+    battery: float | None = field(default=None, validator=optional(_not_negative))
+    endurance: float | None = field(default=None, validator=optional(_positive))
+    pose_silence: tuple[float, float] | None = None
 
 
 @frozen(kw_only=True)
@@ -321,6 +327,7 @@ class Net:
             port of it for a flight on one machine.
         interface: Network interface of the radio.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
+        full_mesh: Up to this many drones everyone links to everyone; of more, only those who must.
     """
 
     profile: Profile = "laptop"
@@ -332,6 +339,7 @@ class Net:
     multicast: str = ""
     interface: str = "lo"
     adminspace: bool = False
+    full_mesh: int = field(default=16, validator=_not_negative)
 
 
 @frozen(kw_only=True)

@@ -75,14 +75,32 @@ class Senses:
                 except DecodeError as error:
                     self._reject(key, error, arrival_ns)
 
+    def hear_hand(self, sample: HandSample, arrival_ns: int) -> None:
+        """Takes a sample in.
+
+        Raises:
+            DecodeError: It is not newer than the last one.
+        """
+        _check_newer(sample, self.hand, arrival_ns, HAND.stale_s)
+        self.hand = Sensed(sample, arrival_ns)
+
+    def hear_drone(self, state: DroneState, arrival_ns: int) -> None:
+        """Takes a state in.
+
+        Raises:
+            DecodeError: It is not newer than the last one of that drone.
+        """
+        _check_newer(state, self.drones.get(state.id), arrival_ns, DRONE_STATE.stale_s)
+        self.drones[state.id] = Sensed(state, arrival_ns)
+
     def _take_one(self, key: str, payload: bytes, arrival_ns: int) -> None:
         if key == _HAND_KEY:
-            if self._verify:
-                self._verify(payload)
             sample = decode(payload, HandSample)
-            # A signed sample that is older was recorded from the air: no silence makes it acceptable.
-            _check_newer(sample, self.hand, arrival_ns, NEVER if self._verify else HAND.stale_s)
-            self.hand = Sensed(sample, arrival_ns)
+            if self._verify:
+                # A signed sample that is older was recorded from the air: no silence makes it acceptable.
+                _check_newer(sample, self.hand, arrival_ns, NEVER)
+                self._verify(payload)
+            self.hear_hand(sample, arrival_ns)
             return
         drone = self._ids.get(key)
         if drone is None:
@@ -90,8 +108,7 @@ class Senses:
         state = decode(payload, DroneState)
         if state.id != drone:
             raise DecodeError("wrong-id", f"drone {state.id} on {key}")
-        _check_newer(state, self.drones.get(drone), arrival_ns, DRONE_STATE.stale_s)
-        self.drones[drone] = Sensed(state, arrival_ns)
+        self.hear_drone(state, arrival_ns)
 
     def _reject(self, key: str, error: DecodeError, now_ns: int) -> None:
         self.rejected[error.reason] += 1

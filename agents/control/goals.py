@@ -1,6 +1,7 @@
 """Goals from references and link corrections: one matrix row per drone (Eqs. 11-13, DESIGN section 4)."""
 
 import numpy as np
+import numpy.typing as npt
 from attrs import field, frozen
 
 from agents.control.impedance import LinkState
@@ -15,7 +16,7 @@ class Rows:
         weights: (n, 1 + m) reference weights over `[human, m references]`.
         offsets: (n, 3) m, formation frame.
         links: The L links into these drones.
-        incidence: (n, L) which link acts on which row.
+        targets: (L,) row that each link acts on.
         limits: (L, 1) bound per displacement, m.
         scale: Factor on every correction.
     """
@@ -23,9 +24,15 @@ class Rows:
     weights: Vec = field(eq=False)
     offsets: Vec = field(eq=False)
     links: tuple[Link, ...]
-    incidence: Vec = field(eq=False)
+    targets: npt.NDArray[np.intp] = field(eq=False)
     limits: Vec = field(eq=False)
     scale: float
+
+    def sum_links(self, terms: Vec) -> Vec:
+        """Returns the sums (..., n, k) of terms (..., L, k) over the links into each row."""
+        total = np.zeros((*terms.shape[:-2], len(self.offsets), terms.shape[-1]))
+        np.add.at(total, (..., self.targets, slice(None)), terms)  # type: ignore[arg-type]  # the stub lacks tuples
+        return total
 
 
 def agent_row(formation: Formation, drone: int) -> Rows:
@@ -41,12 +48,12 @@ def all_rows(formation: Formation) -> Rows:
 
 
 def _rows(formation: Formation, rows: list[int], weights: Vec, links: tuple[Link, ...]) -> Rows:
-    incidence = np.array([[float(link.target == row) for link in links] for row in rows])
+    places = {row: place for place, row in enumerate(rows)}
     return Rows(
         weights=weights,
         offsets=formation.offsets[rows],
         links=links,
-        incidence=incidence.reshape(len(rows), len(links)),
+        targets=np.array([places[link.target] for link in links], dtype=np.intp),
         limits=np.array([link.limit for link in links]).reshape(-1, 1),
         scale=formation.correction_scale,
     )
@@ -60,7 +67,7 @@ def corrections(rows: Rows, links: LinkState) -> tuple[Vec, Vec]:
     """
     term = np.minimum(np.maximum(links.displacement, -rows.limits), rows.limits)
     moving = np.where(term == links.displacement, links.rate, 0.0)
-    total, rate = rows.incidence @ term, rows.incidence @ moving
+    total, rate = rows.sum_links(term), rows.sum_links(moving)
     rate[..., 0] *= -np.sign(total[..., 0])
     total[..., 0] = -np.abs(total[..., 0])
     return rows.scale * total, rows.scale * rate

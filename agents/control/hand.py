@@ -5,11 +5,11 @@ clock: agents that use the same samples map them to the same point, whenever the
 """
 
 import math
+from typing import NamedTuple
 
-import numpy as np
-from attrs import evolve, field, frozen
+from attrs import frozen
 
-from shared.formation import Vec
+from agents.control.single.vectors import ORIGIN, Vector, clamp, norm
 from shared.scenario import Hand
 
 MAX_SAMPLE_GAP = 0.1
@@ -19,37 +19,35 @@ OUTERMOST_SPEED = 1.0
 """Yaw turns the formation so that its outermost drone stays below this, m/s."""
 
 
-@frozen(kw_only=True)
-class HandInput:
+class HandInput(NamedTuple):
     """One hand sample in the world frame.
 
     Attributes:
-        position: (3,) m.
-        velocity: (3,) m/s.
+        position: m.
+        velocity: m/s.
         yaw: rad.
         stamp: Time of the sample on its source's clock, s; only differences are used.
     """
 
-    position: Vec = field(eq=False)
-    velocity: Vec = field(eq=False)
+    position: Vector
+    velocity: Vector
     yaw: float
     stamp: float
 
 
-@frozen(kw_only=True)
-class MappedHand:
+class MappedHand(NamedTuple):
     """The mapped hand.
 
     Attributes:
-        point: (3,) where the formation's human is, world frame, m.
-        velocity: (3,) its velocity, m/s.
+        point: Where the formation's human is, world frame, m.
+        velocity: Its velocity, m/s.
         yaw: Heading of the formation, rad.
         yaw_rate: rad/s.
         stamp: Stamp of the sample it was made from, s.
     """
 
-    point: Vec = field(eq=False)
-    velocity: Vec = field(eq=False)
+    point: Vector
+    velocity: Vector
     yaw: float
     yaw_rate: float
     stamp: float
@@ -61,14 +59,14 @@ class HandSettings:
 
     Attributes:
         hand: The scenario's `[hand]`.
-        low: (3,) lower corner that the mapped hand is clamped to, m.
-        high: (3,) upper corner, m.
+        low: Lower corner that the mapped hand is clamped to, m.
+        high: Upper corner, m.
         radius: Distance of the outermost drone at rest, m.
     """
 
     hand: Hand
-    low: Vec = field(eq=False)
-    high: Vec = field(eq=False)
+    low: Vector
+    high: Vector
     radius: float
 
 
@@ -86,46 +84,52 @@ def map_hand(previous: MappedHand | None, sample: HandInput, settings: HandSetti
     target, velocity = _target(sample, settings)
     yaw = sample.yaw if settings.hand.follow_yaw else 0.0
     if previous is None:
-        capped = _capped(velocity, settings.hand.max_speed)
-        return MappedHand(point=target, velocity=capped, yaw=yaw, yaw_rate=0.0, stamp=sample.stamp)
+        return MappedHand(target, _capped(velocity, settings.hand.max_speed), yaw, 0.0, sample.stamp)
     dt = min(max(sample.stamp - previous.stamp, 0.0), MAX_SAMPLE_GAP)
     point, velocity = _chase(previous.point, target, velocity, settings.hand.max_speed, dt)
     turned, yaw_rate = _turn(previous.yaw, yaw, OUTERMOST_SPEED / max(settings.radius, 0.1), dt)
-    return MappedHand(point=point, velocity=velocity, yaw=turned, yaw_rate=yaw_rate, stamp=sample.stamp)
+    return MappedHand(point, velocity, turned, yaw_rate, sample.stamp)
 
 
 def freeze(mapped: MappedHand) -> MappedHand:
     """Returns the mapped hand at rest where it is (HOLD, or the hand is silent)."""
-    return evolve(mapped, velocity=np.zeros(3), yaw_rate=0.0)
+    return mapped._replace(velocity=ORIGIN, yaw_rate=0.0)
 
 
-def _target(sample: HandInput, settings: HandSettings) -> tuple[Vec, Vec]:
+def _target(sample: HandInput, settings: HandSettings) -> tuple[Vector, Vector]:
     """Applies mapping, fixed height and clamps; a clamped axis has no velocity."""
     hand = settings.hand
-    point, velocity = sample.position, sample.velocity
+    (x, y, z), (u, v, w) = sample.position, sample.velocity
     if hand.mapping == "relative":
-        point = np.array(hand.offset) + hand.gain * point
-        velocity = hand.gain * velocity
+        k, (a, b, c) = hand.gain, hand.offset
+        x, y, z, u, v, w = a + k * x, b + k * y, c + k * z, k * u, k * v, k * w
     if hand.height is not None:
-        point = np.array([point[0], point[1], hand.height])
-        velocity = np.array([velocity[0], velocity[1], 0.0])
-    clamped = np.minimum(np.maximum(point, settings.low), settings.high)
-    return clamped, np.where(clamped == point, velocity, 0.0)
+        z, w = hand.height, 0.0
+    clamped = clamp((x, y, z), settings.low, settings.high)
+    a, b, c = clamped
+    return clamped, (u if a == x else 0.0, v if b == y else 0.0, w if c == z else 0.0)
 
 
-def _chase(point: Vec, target: Vec, velocity: Vec, max_speed: float, dt: float) -> tuple[Vec, Vec]:
+def _chase(
+    point: Vector, target: Vector, velocity: Vector, max_speed: float, dt: float
+) -> tuple[Vector, Vector]:
     """Moves towards the target by at most `max_speed * dt`; arriving, it takes over the hand's velocity."""
-    way = target - point
-    distance = math.sqrt(way @ way)
+    (x, y, z), (a, b, c) = point, target
+    way = (a - x, b - y, c - z)
+    distance = norm(way)
     if distance > max_speed * dt:
-        heading = way / distance
-        return point + heading * max_speed * dt, heading * max_speed
+        u, v, w = (component / distance for component in way)
+        heading = (u * max_speed, v * max_speed, w * max_speed)
+        return (x + u * max_speed * dt, y + v * max_speed * dt, z + w * max_speed * dt), heading
     return target, _capped(velocity, max_speed)
 
 
-def _capped(velocity: Vec, max_speed: float) -> Vec:
-    speed = math.sqrt(velocity @ velocity)
-    return velocity if speed <= max_speed else velocity * (max_speed / speed)
+def _capped(velocity: Vector, max_speed: float) -> Vector:
+    speed = norm(velocity)
+    if speed <= max_speed:
+        return velocity
+    share = max_speed / speed
+    return (velocity[0] * share, velocity[1] * share, velocity[2] * share)
 
 
 def _turn(yaw: float, target: float, max_rate: float, dt: float) -> tuple[float, float]:

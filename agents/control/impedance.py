@@ -4,6 +4,7 @@
 exact for any damping and any dt > 0 (DESIGN section 4); the paper's printed `Ad` has the wrong signs.
 """
 
+import functools
 import math
 from collections.abc import Sequence
 
@@ -50,21 +51,16 @@ def step_links(state: LinkState, transition: Vec, hand_velocity: Vec) -> LinkSta
 
 
 def transition_rows(links: Sequence[Link], dt: float) -> Vec:
-    """Returns (L, 6) rows `[Ad00, Ad01, Ad10, Ad11, Bd0, Bd1]`, computed once per distinct parameter set."""
-    known: dict[tuple[float, float, float, float], tuple[float, ...]] = {}
-    rows = np.empty((len(links), 6))
-    for i, link in enumerate(links):
-        key = (link.mass, link.damping, link.stiffness, link.gain)
-        if key not in known:
-            known[key] = discretise(*key, dt)
-        rows[i] = known[key]
-    return rows
+    """Returns (L, 6) rows `[Ad00, Ad01, Ad10, Ad11, Bd0, Bd1]`."""
+    rows = [discretise(link.mass, link.damping, link.stiffness, link.gain, dt) for link in links]
+    return np.array(rows).reshape(len(links), 6)
 
 
+@functools.lru_cache(maxsize=64)
 def discretise(
     mass: float, damping: float, stiffness: float, gain: float, dt: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Exact zero-order-hold discretisation of one link.
+    """Exact zero-order-hold discretisation of one link; remembered, because links mostly have equal parameters.
 
     With `s = -D/2M` and `q = s^2 - K/M` of either sign, `Ad = e^{sT} [C I + T S (A - s I)]` with
     `C = cosh(T sqrt q)`, `S = sinh(T sqrt q) / (T sqrt q)`; no branch at critical damping.

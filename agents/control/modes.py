@@ -18,10 +18,17 @@ POSE_FRESH = 0.1
 """Take-off needs a pose at most this old, s."""
 ARRIVED = 0.10
 """Take-off ends this close to the take-off height, m."""
+POSE_LOST = 0.5
+"""A drone in the air without a pose for this long descends open-loop, s."""
+LOW_BATTERY = 0.2
+"""Charge below which the operator is told ..."""
+CRITICAL_BATTERY = 0.1
+"""... and below which a drone lands by itself and does not take off."""
 TOUCHDOWN = 0.06
 """Below this height a landing drone is on the ground, m."""
 
 AIRBORNE_MODES = frozenset({Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND})
+_FLYING_MODES = AIRBORNE_MODES - {Mode.LAND}
 GUIDED_MODES = frozenset({Mode.FOLLOW, Mode.HOLD})
 """Modes in which a drone is part of the formation and can be referred to."""
 
@@ -34,7 +41,8 @@ class ModeInputs:
         wish: The operator's newest wish, None before the first sample.
         hand_age: Time since the newest hand sample arrived, s; infinite before the first.
         pose_age: Time since the vehicle's newest pose arrived, s; infinite before the first.
-        height: Height of the body, m.
+        battery: Charge, 0..1.
+        height: Height of the body, m; of where it should be while the pose is lost.
         takeoff_height: Height at which it joins the formation, m.
         references_follow: Every reference is in FOLLOW.
     """
@@ -42,6 +50,7 @@ class ModeInputs:
     wish: Wish | None
     hand_age: float
     pose_age: float
+    battery: float
     height: float
     takeoff_height: float
     references_follow: bool
@@ -71,11 +80,15 @@ def next_mode(state: ModeState, inputs: ModeInputs) -> ModeState:
         return evolve(state, mode=Mode.STOP)
     if state.must_ask_again and inputs.hand_age <= HAND_STALE and inputs.wish is not Wish.FLY:
         state = evolve(state, must_ask_again=False)
+    empty = inputs.battery <= CRITICAL_BATTERY
+    if state.mode in _FLYING_MODES and (empty or inputs.pose_age > POSE_LOST):
+        return evolve(state, mode=Mode.LAND, must_ask_again=empty or state.must_ask_again)
     return _NEXT[state.mode](state, inputs)
 
 
 def _ground(state: ModeState, inputs: ModeInputs) -> ModeState:
-    ready = inputs.pose_age <= POSE_FRESH and _flown_by_hand(inputs) and not state.must_ask_again
+    able = inputs.pose_age <= POSE_FRESH and inputs.battery > CRITICAL_BATTERY
+    ready = able and _flown_by_hand(inputs) and not state.must_ask_again
     return evolve(state, mode=Mode.TAKEOFF) if ready else state
 
 

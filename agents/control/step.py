@@ -1,25 +1,33 @@
 """One control step of one drone: mode, hand, links, goal, steering. State and time in, state and output out."""
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
-import numpy as np
-from attrs import evolve, field, frozen
+from attrs import frozen
 
 from agents.control import modes
-from agents.control.avoidance import Encounters
-from agents.control.goals import Rows, corrections, goal_velocities, goals, place_velocities, rotate
 from agents.control.hand import HandInput, HandSettings, MappedHand, freeze, map_hand
-from agents.control.impedance import LinkState, rest_state, step_links, transition_rows
 from agents.control.modes import ModeInputs, ModeState, next_mode
-from agents.control.steering import LONGEST_STEP, SteeringSettings, Surroundings, steer
-from agents.control.trajectory import Trajectory, start_at
-from shared.formation import Vec
-from shared.messages import MAX_POSITION, MAX_VELOCITY, Flag, Mode, Wish
+from agents.control.single.avoidance import Encounter
+from agents.control.single.goals import Row, goal_of
+from agents.control.single.impedance import AT_REST, LinkState, step_links
+from agents.control.single.repair import (
+    Guide,
+    Kin,
+    Reference,
+    StandIn,
+    guide_of,
+    guides,
+    nobody_gone,
+    replace_lost,
+)
+from agents.control.single.steering import Bystander, SteeringSettings, Surroundings, steer
+from agents.control.single.trajectory import Trajectory, start_at
+from agents.control.single.vectors import ORIGIN, Vector, norm, rotate
+from agents.control.steering import LONGEST_STEP
+from shared.messages import NO_FLAGS, Flag, Mode, Wish
 
-REFERENCE_LOST = 0.5
-"""A reference unheard for this long is lost, s."""
-EXTRAPOLATION = 0.25
-"""A silent reference is extrapolated by at most this, m."""
 BLOCKED_ERROR = 0.3
 """Goal error that counts as not arriving, m ..."""
 BLOCKED_TIME = 2.0
@@ -31,114 +39,99 @@ class Settings:
     """Everything about one drone that does not change in flight.
 
     Attributes:
-        rows: Its row of the formation.
+        row: Its row of the formation.
         hand: How the hand is mapped.
         steering: Limits and fields.
         stable: Whether references are the neighbours' goals instead of their positions.
-        reference_heights: (m,) rest heights of the references above the hand, m; None uses their actual ones.
+        reference_heights: Rest heights of the references above the hand, m; None uses their actual ones.
+        kin: Its ancestors in the reference graph, the references of its row first and in their order.
         takeoff_height: Where it joins the formation, m.
         takeoff_speed: m/s.
         landing_speed: m/s.
     """
 
-    rows: Rows
+    row: Row
     hand: HandSettings
     steering: SteeringSettings
     stable: bool
-    reference_heights: Vec | None = field(eq=False)
+    reference_heights: tuple[float, ...] | None
+    kin: tuple[Kin, ...]
     takeoff_height: float
     takeoff_speed: float
     landing_speed: float
 
 
-@frozen(kw_only=True)
-class Reference:
-    """A reference drone as last heard.
-
-    Attributes:
-        point: (3,) its position (`paper`) or goal (`stable`), m.
-        velocity: (3,) the rate of that, m/s.
-        goal_velocity: (3,) its broadcast goal velocity, m/s.
-        mode: Its mode.
-        age: Time since its sample arrived, s.
-        fresh: Whether the sample is newer than the one of the last step.
-    """
-
-    point: Vec = field(eq=False)
-    velocity: Vec = field(eq=False)
-    goal_velocity: Vec = field(eq=False)
-    mode: Mode
-    age: float
-    fresh: bool
-
-
-@frozen(kw_only=True)
-class Inputs:
+class Inputs(NamedTuple):
     """What one step works on.
 
     Attributes:
-        position: (3,) own body, m.
-        velocity: (3,) own body, m/s.
+        position: Own body, m.
+        velocity: Own body, m/s.
         pose_age: s.
+        battery: Charge, 0..1.
         hand: Newest hand sample, None before the first.
         wish: Its wish.
         hand_age: Time since it arrived, s.
         hand_fresh: Whether it is newer than the one of the last step.
-        references: One per reference of the row; None where never heard.
+        references: What is known of each of the kin; None where never heard.
         drones: Every other drone.
+        silent: Those of them that have fallen silent, where they may be by now.
     """
 
-    position: Vec = field(eq=False)
-    velocity: Vec = field(eq=False)
+    position: Vector
+    velocity: Vector
     pose_age: float
+    battery: float
     hand: HandInput | None
     wish: Wish | None
     hand_age: float
     hand_fresh: bool
     references: tuple[Reference | None, ...]
-    drones: Encounters
+    drones: Sequence[Encounter]
+    silent: Sequence[Bystander] = ()
 
 
-@frozen(kw_only=True)
-class State:
+class State(NamedTuple):
     """What one step hands to the next.
 
     Attributes:
         mode: Flight mode.
         hand: Mapped hand, None before the first sample.
-        links: Impedance links.
+        links: Impedance links, in the order of the row's.
         trajectory: Reference of the set-point.
-        anchor: (3,) own goal while no reference is usable, m.
+        anchor: Own goal while no reference is usable, m.
         blocked_for: How long the drone has not arrived, s.
+        stand_ins: How far each of the kin has been replaced.
     """
 
     mode: ModeState
     hand: MappedHand | None
-    links: LinkState
+    links: tuple[LinkState, ...]
     trajectory: Trajectory
-    anchor: Vec = field(eq=False)
+    anchor: Vector
     blocked_for: float
+    stand_ins: tuple[StandIn, ...]
 
 
-@frozen(kw_only=True)
-class Output:
-    """Result of one step: (3,) vectors in the world frame, m and m/s, and the conditions."""
+class Output(NamedTuple):
+    """Result of one step: vectors in the world frame, m and m/s, and the conditions."""
 
-    goal: Vec = field(eq=False)
-    goal_velocity: Vec = field(eq=False)
-    setpoint: Vec = field(eq=False)
+    goal: Vector
+    goal_velocity: Vector
+    setpoint: Vector
     flags: Flag
 
 
-def start(position: Vec, settings: Settings, *, airborne: bool) -> State:
+def start(position: Vector, settings: Settings, *, airborne: bool) -> State:
     """Returns the state of a process that has just read its vehicle's pose."""
     return State(
         mode=modes.initial_mode(airborne=airborne),
         hand=None,
-        links=rest_state(len(settings.rows.links)),
-        trajectory=start_at(position[None, :]),
+        links=(AT_REST,) * len(settings.row.links),
+        trajectory=start_at(position),
         anchor=position,
         blocked_for=0.0,
+        stand_ins=nobody_gone(settings.kin),
     )
 
 
@@ -154,53 +147,68 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
     Returns:
         The state after the step, and what to publish and to send to the vehicle.
     """
-    usable = all(r is not None and _usable(r) for r in inputs.references)
-    mode = next_mode(state.mode, _mode_inputs(inputs, settings, usable=usable))
+    stand_ins = _stand_ins(state, inputs, settings, dt)
+    lead = _lead(stand_ins, state.hand, inputs, settings)
+    usable = lead is not None
+    mode = next_mode(state.mode, _mode_inputs(state, inputs, settings, lead))
     hand = _hand(state, inputs, mode.mode, settings.hand)
-    velocity = np.zeros(3) if hand is None else rotate(hand.velocity, -hand.yaw)
-    links = step_links(state.links, transition_rows(settings.rows.links, dt), velocity)
+    velocity = ORIGIN if hand is None else rotate(hand.velocity, -hand.yaw)
+    links = step_links(state.links, settings.row.links, velocity, dt)
 
-    guided = mode.mode in modes.GUIDED_MODES and usable and hand is not None
-    if guided and hand is not None:
-        goal, goal_velocity = _law(inputs, hand, links, settings)
-        anchor = state.trajectory.point[0]
+    if mode.mode in modes.GUIDED_MODES and lead is not None and hand is not None:
+        points, velocities = [guide.point for guide in lead], [guide.velocity for guide in lead]
+        goal, goal_velocity = goal_of(settings.row, links, hand, points, velocities, settings.reference_heights)
+        anchor = state.trajectory.point
     else:
         anchor = goal = _own_goal(state, mode.mode, inputs.position, settings, min(dt, LONGEST_STEP))
-        goal_velocity = np.zeros(3)
+        goal_velocity = ORIGIN
 
-    trajectory = state.trajectory if mode.mode in modes.AIRBORNE_MODES else start_at(inputs.position[None, :])
-    around = _surroundings(inputs)
-    steered = steer(trajectory, goal[None, :], goal_velocity[None, :], around, settings.steering, dt)
-    error = math.dist(goal, inputs.position)
-    late = mode.mode is Mode.FOLLOW and error > BLOCKED_ERROR
+    trajectory = state.trajectory if mode.mode in modes.AIRBORNE_MODES else start_at(inputs.position)
+    steered = steer(trajectory, goal, goal_velocity, _surroundings(inputs), settings.steering, dt)
+    late = mode.mode is Mode.FOLLOW and math.dist(goal, inputs.position) > BLOCKED_ERROR
     blocked_for = state.blocked_for + dt if late else 0.0
-    flags = _flags(inputs, usable=usable, fenced=bool(steered.fenced[0]), avoiding=bool(steered.avoiding[0]))
+    flags = _flags(inputs, settings, usable=usable, fenced=steered.fenced, avoiding=steered.avoiding)
     if blocked_for > BLOCKED_TIME:
         flags |= Flag.BLOCKED
-    after = State(
-        mode=mode,
-        hand=hand,
-        links=links,
-        trajectory=steered.trajectory,
-        anchor=anchor,
-        blocked_for=blocked_for,
-    )
-    return after, Output(goal=goal, goal_velocity=goal_velocity, setpoint=steered.setpoint[0], flags=flags)
+    if any(stand_in.share > 0.0 for stand_in in stand_ins[: len(settings.row.weights) - 1]):
+        flags |= Flag.REPAIRED
+    after = State(mode, hand, links, steered.trajectory, anchor, blocked_for, stand_ins)
+    return after, Output(goal, goal_velocity, steered.setpoint, flags)
 
 
-def _usable(reference: Reference) -> bool:
-    return reference.age <= REFERENCE_LOST and reference.mode in modes.GUIDED_MODES
+def _stand_ins(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[StandIn, ...]:
+    """Replaces who is gone while there is a formation; on the ground everybody is expected to join."""
+    mode = state.mode.mode
+    if mode not in modes.GUIDED_MODES and mode is not Mode.TAKEOFF:
+        return nobody_gone(settings.kin)
+    velocity = ORIGIN if state.hand is None else rotate(state.hand.velocity, -state.hand.yaw)
+    return replace_lost(state.stand_ins, settings.kin, inputs.references, velocity, dt)
 
 
-def _mode_inputs(inputs: Inputs, settings: Settings, *, usable: bool) -> ModeInputs:
-    follow = usable and all(r is not None and r.mode is Mode.FOLLOW for r in inputs.references)
+def _lead(
+    stand_ins: tuple[StandIn, ...], hand: MappedHand | None, inputs: Inputs, settings: Settings
+) -> list[Guide] | None:
+    """Returns whom to follow in the place of each reference; None if one of them has not joined yet."""
+    wanted = len(settings.row.weights) - 1
+    if hand is None:
+        # Without a hand there is no goal; all that counts is whether the references hold or follow.
+        found = [guide_of(reference) for reference in inputs.references[:wanted]]
+    else:
+        found = guides(stand_ins, settings.kin, inputs.references, wanted, hand)
+    lead = [guide for guide in found if guide is not None]
+    return lead if len(lead) == wanted else None
+
+
+def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Guide] | None) -> ModeInputs:
+    lost = inputs.pose_age > modes.POSE_LOST
     return ModeInputs(
         wish=inputs.wish,
         hand_age=inputs.hand_age,
         pose_age=inputs.pose_age,
-        height=float(inputs.position[2]),
+        battery=inputs.battery,
+        height=state.anchor[2] if lost else inputs.position[2],
         takeoff_height=settings.takeoff_height,
-        references_follow=follow,
+        references_follow=lead is not None and all(guide.follows for guide in lead),
     )
 
 
@@ -221,42 +229,13 @@ def _hand(state: State, inputs: Inputs, mode: Mode, settings: HandSettings) -> M
     return map_hand(mapped, sample, settings) if inputs.hand_fresh else mapped
 
 
-def _law(inputs: Inputs, hand: MappedHand, links: LinkState, settings: Settings) -> tuple[Vec, Vec]:
-    """Returns goal and goal velocity (3,) of this row: Eqs. 11-13, or the same on the references' goals."""
-    rows = settings.rows
-    heard = [r for r in inputs.references if r is not None]
-    points = np.array([hand.point, *(_extrapolated(r) for r in heard)])
-    if settings.reference_heights is not None:
-        points[1:, 2] = hand.point[2] + settings.reference_heights
-    velocities = np.array([hand.velocity, *(r.goal_velocity for r in heard)])
-    correction, rate = corrections(rows, links)
-    goal = goals(rows, points, correction, hand.yaw)
-    places = place_velocities(rows, correction, rate, hand.yaw, hand.yaw_rate)
-    goal_velocity = goal_velocities(rows, velocities, places)
-    # A goal that no receiver would accept, because a reference is at the edge of the range, helps nobody.
-    return _within(goal[0], MAX_POSITION), _within(goal_velocity[0], MAX_VELOCITY)
-
-
-def _within(vector: Vec, largest: float) -> Vec:
-    return np.minimum(np.maximum(vector, -largest), largest)
-
-
-def _extrapolated(reference: Reference) -> Vec:
-    """Returns where a silent reference would be by now, at most 0.25 m from where it was last."""
-    if reference.fresh:
-        return reference.point
-    way = reference.velocity * reference.age
-    length = math.sqrt(way @ way)
-    return reference.point + (way if length <= EXTRAPOLATION else way * (EXTRAPOLATION / length))
-
-
-def _own_goal(state: State, mode: Mode, position: Vec, settings: Settings, dt: float) -> Vec:
+def _own_goal(state: State, mode: Mode, position: Vector, settings: Settings, dt: float) -> Vector:
     """Returns the goal of a drone on its own: climbing, descending, holding, or standing on the ground."""
     x, y, z = state.anchor
     if mode is Mode.TAKEOFF:
-        return np.array([x, y, max(z, min(z + settings.takeoff_speed * dt, settings.takeoff_height))])
+        return (x, y, max(z, min(z + settings.takeoff_speed * dt, settings.takeoff_height)))
     if mode is Mode.LAND:
-        return np.array([x, y, max(z - settings.landing_speed * dt, 0.0)])
+        return (x, y, max(z - settings.landing_speed * dt, 0.0))
     if mode is Mode.HOLD:
         return state.anchor
     return position
@@ -264,30 +243,30 @@ def _own_goal(state: State, mode: Mode, position: Vec, settings: Settings, dt: f
 
 def _surroundings(inputs: Inputs) -> Surroundings:
     """Returns who is around; a silent hand stays where it was, but no longer comes closer."""
-    around = Surroundings(
-        position=inputs.position[None, :],
-        velocity=inputs.velocity[None, :],
-        drones=inputs.drones,
-        hand=None,
-        hand_speed=0.0,
+    hand = inputs.hand
+    if hand is None:
+        return Surroundings(inputs.position, inputs.velocity, inputs.drones, None, 0.0, inputs.silent)
+    x, y, _ = hand.position
+    u, v, _ = velocity = hand.velocity if inputs.hand_age <= modes.HAND_STALE else ORIGIN
+    return Surroundings(
+        inputs.position, inputs.velocity, inputs.drones, (x, y, u, v), norm(velocity), inputs.silent
     )
-    if inputs.hand is None:
-        return around
-    velocity = inputs.hand.velocity if inputs.hand_age <= modes.HAND_STALE else np.zeros(3)
-    hand = Encounters(
-        row=np.zeros(1, dtype=np.intp), position=inputs.hand.position[None, :2], velocity=velocity[None, :2]
-    )
-    return evolve(around, hand=hand, hand_speed=math.sqrt(velocity @ velocity))
 
 
-def _flags(inputs: Inputs, *, usable: bool, fenced: bool, avoiding: bool) -> Flag:
-    flags = Flag(0)
-    if any(r is not None and not r.fresh for r in inputs.references):
+def _flags(inputs: Inputs, settings: Settings, *, usable: bool, fenced: bool, avoiding: bool) -> Flag:
+    flags = NO_FLAGS
+    if any(r is not None and not r.fresh for r in inputs.references[: len(settings.row.weights) - 1]):
         flags |= Flag.EXTRAPOLATING
     if not usable:
         flags |= Flag.REFERENCE_LOST
     if inputs.hand_age > modes.HAND_STALE:
         flags |= Flag.HAND_STALE
+    if inputs.pose_age > modes.POSE_FRESH:
+        flags |= Flag.OLD_POSE
+    if inputs.battery <= modes.LOW_BATTERY:
+        flags |= Flag.LOW_BATTERY
+    if inputs.battery <= modes.CRITICAL_BATTERY:
+        flags |= Flag.CRITICAL_BATTERY
     if fenced:
         flags |= Flag.FENCE
     if avoiding:

@@ -9,7 +9,7 @@ from attrs import field, frozen
 
 from shared.formation import Vec
 
-_BRAKING_SHARE = 0.8
+BRAKING_SHARE = 0.8
 """Share of the acceleration limit used to plan braking; the rest is for following a moving goal."""
 
 
@@ -51,7 +51,7 @@ def tracking_velocity(trajectory: Trajectory, goal: Vec, dt: float, acceleration
     goal_velocity = (goal - trajectory.goal) / dt
     error = trajectory.goal - trajectory.point
     distance = norm(error)
-    closing = np.minimum(distance / dt, np.sqrt(2.0 * _BRAKING_SHARE * acceleration * distance))
+    closing = np.minimum(distance / dt, np.sqrt(2.0 * BRAKING_SHARE * acceleration * distance))
     return goal_velocity + error * (closing / np.maximum(distance, 1e-12))
 
 

@@ -23,7 +23,7 @@ def zenoh_rows(scenario: Scenario, formation: Formation, sizes: Mapping[int, int
 
     def row(node: int) -> ProcessRow:
         name = RELAY_NODE if node == HAND_ID else drone_node(node)
-        heard = [] if node == HAND_ID else [HAND.key(), *_state_keys(formation, node)]
+        heard = [] if node == HAND_ID else [HAND.key(), *_state_keys(scenario, formation, node)]
         return _row(
             "deploy.bench.floor_zenoh",
             node,
@@ -49,7 +49,7 @@ def udp_rows(
         observer: Port of the observer.
     """
     port = dict(zip((HAND_ID, *formation.ids), ports, strict=True))
-    hearing = {drone: neighbours(formation, drone) for drone in formation.ids}
+    hearing = {drone: neighbours(scenario, formation, drone) for drone in formation.ids}
 
     def row(node: int) -> ProcessRow:
         listeners = [port[drone] for drone, heard in hearing.items() if node == HAND_ID or node in heard]
@@ -75,8 +75,8 @@ def _common(scenario: Scenario, formation: Formation, sizes: Mapping[int, int], 
     )
 
 
-def _state_keys(formation: Formation, drone: int) -> list[str]:
-    return [DRONE_STATE.key(id=other) for other in neighbours(formation, drone)]
+def _state_keys(scenario: Scenario, formation: Formation, drone: int) -> list[str]:
+    return [DRONE_STATE.key(id=other) for other in neighbours(scenario, formation, drone)]
 
 
 def _each(option: str, values: Sequence[object]) -> list[str]:

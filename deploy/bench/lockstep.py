@@ -1,6 +1,6 @@
 """`bench lockstep`: how much faster than real time the simulators are, in one process on one core.
 
-Small swarms run as real agents that exchange encoded bytes, large ones as one batch of arrays.
+Small swarms run as real agents, large ones as one batch of arrays.
 """
 
 import itertools
@@ -71,7 +71,7 @@ def measure(
 def _agents(settings: Scenario, formation: Formation, samples: Sequence[HandSample]) -> Iterator[object]:
     hand = track_hand(samples[:1], hand_settings(settings, formation))
     fleet = start_fleet(settings, formation, rest_places(formation, hand), airborne=True)
-    swarm = Lockstep(settings, formation, fleet)
+    swarm = Lockstep(settings, formation, fleet, encoded=False)
     return (swarm.advance(sample) for sample in samples)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from attrs import frozen
 
+from deploy.bench.comb import comb
 from deploy.bench.figures import spread
 from deploy.bench.flight_ear import FlightEar
 from deploy.bench.floor_ear import FloorEar
@@ -20,9 +21,6 @@ from shared.config import load_scenario
 from shared.formation import Formation, build_formation
 from shared.nodes import neighbours
 from shared.scenario import Scenario
-
-SPACING = ("formation.spacing=1.0", "formation.width=1.0")
-"""A grid so wide that a drone has at most eight others within the reach of `shared.nodes.NEAR`."""
 
 
 @frozen(kw_only=True)
@@ -50,7 +48,7 @@ def measure(
         agents: The sizes.
         seconds: How long each swarm is measured, all rounds together.
         rounds: How often real and bare take turns.
-        scenario: What flies; its `formation.n` is set.
+        scenario: What flies; its formation becomes a comb of that size.
         overrides: Further `key=value` items.
         say: Told what is going on.
 
@@ -60,8 +58,7 @@ def measure(
     """
     records = []
     for number in agents:
-        spacing = SPACING if scenario == "grid" else ()
-        settings = load_scenario(scenario, (*spacing, f"formation.n={number}", *overrides))
+        settings = load_scenario(scenario, (*comb(number), *overrides))
         formation = build_formation(settings, scenario)
         turns = []
         for turn in range(rounds):
@@ -132,7 +129,7 @@ def _heard_per_s(settings: Scenario, formation: Formation, summaries: Sequence[A
     for summary in summaries:
         rates[summary.id].append(summary.rate_hz)
     rate = {drone: sum(values) / len(values) for drone, values in rates.items()}
-    heard = sum(rate[other] for drone in formation.ids for other in neighbours(formation, drone))
+    heard = sum(rate[other] for drone in formation.ids for other in neighbours(settings, formation, drone))
     return settings.rates.hand_hz + heard / len(formation.ids)
 
 

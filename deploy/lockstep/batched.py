@@ -7,6 +7,7 @@ drone here sees the others as they are in this tick, while an agent sees those t
 
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
+from typing import NamedTuple
 
 import numpy as np
 from attrs import field, frozen
@@ -19,12 +20,12 @@ from agents.control.trajectory import norm, start_at
 from agents.settings import hand_settings, steering_settings
 from agents.vehicles.bodies.fleet import advance_fleet
 from agents.vehicles.bodies.state import Command, Commands
-from deploy.lockstep.cells import near_pairs
 from deploy.lockstep.hand_track import HandTrack, track_hand
 from deploy.lockstep.record import Moment, Record, make_record
 from deploy.lockstep.start import rest_places, start_fleet
 from deploy.lockstep.ticks import tick_length
-from shared.formation import Formation, Vec
+from shared.cells import Rows, near_pairs
+from shared.formation import Formation, Link, Vec
 from shared.messages import HandSample
 from shared.scenario import Scenario
 
@@ -64,6 +65,33 @@ def hands_at(tracks: Sequence[HandTrack], tick: int) -> Hands:
     )
 
 
+class Level(NamedTuple):
+    """Drones whose references are all in earlier levels.
+
+    Attributes:
+        rows: (k,) the drones.
+        references: (k, r) columns of their references in `[human, drones...]`, padded with 0.
+        weights: (k, r) their weights, padded with 0.
+    """
+
+    rows: Rows
+    references: Rows
+    weights: Vec
+
+
+def _level(weights: Vec, rows: Sequence[int]) -> Level:
+    columns = [np.flatnonzero(weights[row]) for row in rows]
+    shape = (len(rows), max(map(len, columns)))
+    references, shares = np.zeros(shape, dtype=np.intp), np.zeros(shape)
+    for k, (row, own) in enumerate(zip(rows, columns, strict=True)):
+        references[k, : len(own)], shares[k, : len(own)] = own, weights[row, own]
+    return Level(np.array(rows), references, shares)
+
+
+def _parameters(link: Link) -> tuple[float, ...]:
+    return (link.mass, link.damping, link.stiffness, link.gain)
+
+
 class Batch:
     """B runs of one formation of N drones, driven tick by tick.
 
@@ -94,8 +122,11 @@ class Batch:
         self._formation = formation
         self._shape = places.shape
         self._rows = all_rows(formation)
-        # A drone's goal is the hand plus the places of all its ancestors and its own, weighted.
-        self._ancestry = np.linalg.inv(np.eye(drones) - formation.weights[:, 1:])
+        distinct = {_parameters(link): link for link in formation.links}
+        self._link_kinds = tuple(distinct.values())
+        kinds = {parameters: kind for kind, parameters in enumerate(distinct)}
+        self._kind_of = np.array([kinds[_parameters(link)] for link in formation.links], dtype=np.intp)
+        self._levels = [_level(formation.weights, rows) for rows in formation.levels]
         self._links = LinkState(
             displacement=np.zeros((runs, len(formation.links), 3)),
             rate=np.zeros((runs, len(formation.links), 3)),
@@ -139,14 +170,21 @@ class Batch:
     def _law(self, hands: Hands, dt: float) -> tuple[Vec, Vec]:
         """Returns goals and goal velocities (B, N, 3)."""
         velocity = rotate(hands.point_velocity, -hands.yaw)
-        self._links = step_links(self._links, transition_rows(self._rows.links, dt), velocity)
+        self._links = step_links(self._links, transition_rows(self._link_kinds, dt)[self._kind_of], velocity)
         correction, rate = corrections(self._rows, self._links)
         moving = place_velocities(self._rows, correction, rate, hands.yaw, hands.yaw_rate)
-        goal_velocity = hands.point_velocity + self._ancestry @ moving
+        places = rotate(self._rows.offsets + correction, hands.yaw)
+        by_goals, goal_velocity = np.split(self._cascade(hands, np.concatenate([places, moving], axis=2)), 2, 2)
         if self._scenario.swarm.law == "stable":
-            places = rotate(self._rows.offsets + correction, hands.yaw)
-            return hands.point + self._ancestry @ places, goal_velocity
+            return by_goals, goal_velocity
         return goals(self._rows, self._references(hands), correction, hands.yaw), goal_velocity
+
+    def _cascade(self, hands: Hands, own: Vec) -> Vec:
+        """Adds what is each drone's own, (B, N, 6), to the weighted sum over its references, level by level."""
+        found = np.concatenate([np.concatenate([hands.point, hands.point_velocity], axis=2), own], axis=1)
+        for level in self._levels:
+            found[:, 1 + level.rows] += np.einsum("kr,bkrc->bkc", level.weights, found[:, level.references])
+        return found[:, 1:]
 
     def _references(self, hands: Hands) -> Vec:
         """Returns mapped hands and bodies (B, 1 + N, 3)."""

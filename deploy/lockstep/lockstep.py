@@ -1,8 +1,8 @@
-"""The lockstep simulator: real agents that exchange encoded bytes, on a virtual clock.
+"""The lockstep simulator: real agents on a virtual clock, exchanging messages or their encoded bytes.
 
 In a tick the hand's sample reaches everybody, then the agents step level by level on their bodies' poses, each
 published state reaches its listeners at once, and at the end the bodies move on (DESIGN section 4). The same
-inputs give the same bytes.
+inputs give the same bytes, and messages handed over as they are give the same flight as their bytes.
 """
 
 from collections.abc import Sequence
@@ -36,17 +36,19 @@ class Lockstep:
         scenario: The scenario.
         formation: Its formation.
         fleet: Bodies, one per drone in the formation's order.
+        encoded: Whether agents hear bytes, as in flight; it takes longer.
 
     Attributes:
         fleet: The bodies now.
         tick: Number of the next tick.
-        payloads: What was published in the last tick, by key: the hand's sample and every drone's state.
+        payloads: If encoded: what was published in the last tick, by key: the hand's sample and every state.
     """
 
-    def __init__(self, scenario: Scenario, formation: Formation, fleet: Fleet) -> None:
+    def __init__(self, scenario: Scenario, formation: Formation, fleet: Fleet, *, encoded: bool = True) -> None:
         self.fleet = fleet
         self.tick = 0
         self.payloads: dict[str, bytes] = {}
+        self._encoded = encoded
         self._rate = scenario.rates.control_hz
         self._order = [row for level in formation.levels for row in level]
         self._agents = [
@@ -69,11 +71,11 @@ class Lockstep:
             What each drone published, in the formation's order.
         """
         now = tick_ns(self.tick, self._rate)
-        self._publish(HAND.key(), encode(sample), now)
+        self._publish(HAND.key(), sample, now)
         states: dict[int, DroneState] = {}
         for row in self._order:
             states[row] = self._agents[row].step(now, self._pose(row), 0.0)
-            self._publish(self._keys[row], encode(states[row]), now)
+            self._publish(self._keys[row], states[row], now)
         ordered = [states[row] for row in range(len(states))]
         kind = np.array([_COMMANDS.get(state.mode, Command.FLY) for state in ordered], dtype=np.int8)
         commands = Commands(kind, np.array([state.setpoint for state in ordered]))
@@ -81,10 +83,17 @@ class Lockstep:
         self.tick += 1
         return ordered
 
-    def _publish(self, key: str, payload: bytes, now_ns: int) -> None:
-        self.payloads[key] = payload
-        for agent in self._listeners[key]:
-            agent.receive({key: [Arrival(payload, now_ns)]})
+    def _publish(self, key: str, message: HandSample | DroneState, now_ns: int) -> None:
+        if self._encoded:
+            self.payloads[key] = payload = encode(message)
+            for agent in self._listeners[key]:
+                agent.receive({key: [Arrival(payload, now_ns)]})
+        elif isinstance(message, HandSample):
+            for agent in self._listeners[key]:
+                agent.senses.hear_hand(message, now_ns)
+        else:
+            for agent in self._listeners[key]:
+                agent.senses.hear_drone(message, now_ns)
 
     def _pose(self, row: int) -> Pose:
         x, y, z = self.fleet.position[row].tolist()
@@ -107,6 +116,7 @@ def fly_lockstep(
     airborne: bool = True,
     held: AbstractSet[int] = frozenset(),
     places: Vec | None = None,
+    encoded: bool = False,
 ) -> Record:
     """Flies a whole hand.
 
@@ -117,6 +127,7 @@ def fly_lockstep(
         airborne: Start hovering in the rest formation; else on the ground below it.
         held: Drones that a hand holds in place.
         places: (N, 3) where to start instead, m.
+        encoded: See `Lockstep`.
 
     Returns:
         The run.
@@ -124,7 +135,8 @@ def fly_lockstep(
     hand = track_hand(samples, hand_settings(scenario, formation))
     rows = {1 + formation.row(drone) for drone in held}
     start = rest_places(formation, hand) if places is None else places
-    swarm = Lockstep(scenario, formation, start_fleet(scenario, formation, start, airborne=airborne, held=rows))
+    fleet = start_fleet(scenario, formation, start, airborne=airborne, held=rows)
+    swarm = Lockstep(scenario, formation, fleet, encoded=encoded)
     moments = [_moment(formation, swarm.advance(sample)) for sample in samples]
     return make_record(formation, hand, moments)
 

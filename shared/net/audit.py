@@ -11,9 +11,7 @@ from collections.abc import Iterable
 
 from shared.clock import NS_PER_S
 
-LOG_FILTER = (
-    "error,zenoh::net::routing::interceptor::access_control=trace,zenoh_link_commons=warn,zenoh_link_tls=warn"
-)
+LOG_FILTER = "error,zenoh::net::routing::interceptor=trace,zenoh_link_commons=warn,zenoh_link_tls=warn"
 """Zenoh's log level under which refusals are told."""
 REPORT_NS = NS_PER_S
 """Refusals are logged at most this often."""
@@ -23,9 +21,10 @@ MAX_IDENTITIES = 256
 OTHERS = "others"
 STRANGER = "a node without a certificate of ours"
 
-_DENIED = re.compile(
-    r"(cached result: )?([0-9a-f]{1,32}) (?:on \S+ )?is unauthorized to (Put|Delete) \(ingress\) on (\S+)"
+_DECISION = re.compile(
+    r"ThreadId\((\d+)\).* ([0-9a-f]{1,32}) (?:on \S+ )?is unauthorized to (Put|Delete) \(ingress\) on (\S+)"
 )
+_DROPPED = re.compile(r"ThreadId\((\d+)\).* Msg intercepted")
 _REJECTED = re.compile(r"acceptor failed.*?(peer sent no certificates|invalid peer certificate: \w+)")
 
 
@@ -41,6 +40,7 @@ class Audit:
         self._lock = threading.Lock()
         self._names: dict[str, str] = {}
         self._present: set[str] = set()
+        self._decided: dict[str, str] = {}
         self._refused: Counter[str] = Counter()
         self._told: Counter[str] = Counter()
         self._told_ns = 0
@@ -66,15 +66,11 @@ class Audit:
 
     def read(self, text: str) -> None:
         """Takes in a piece of Zenoh's log, whole lines."""
-        if "unauthorized" not in text and "acceptor failed" not in text:
+        if "intercepted" not in text and "acceptor failed" not in text:
             return
         with self._lock:
-            denied = _DENIED.findall(text)
-            # The first decision on a key is told once per network interface, each later one just once.
-            for _, identity, verb, key in [d for d in denied if d[0]] + sorted({d for d in denied if not d[0]}):
-                self._count(f"{self._names.get(identity, identity)} {verb.lower()} {key}")
-            for reason in _REJECTED.findall(text):
-                self._count(f"{STRANGER} ({reason})")
+            for line in text.splitlines():
+                self._read_line(line)
 
     def report(self, now_ns: int) -> str | None:
         """Returns one line about what was refused since the last report, None if nothing or too early."""
@@ -91,6 +87,17 @@ class Audit:
             links = Counter(self._names.get(identity, STRANGER) for identity in self._present)
             named = {f"linked {name}": float(n) for name, n in links.most_common(MAX_NAMES)}
             return named | {f"refused {who}": float(n) for who, n in self._refused.items()}
+
+    def _read_line(self, line: str) -> None:
+        # A decision may be made ahead of any message, and on each of several grounds: what is dropped counts,
+        # for the reason that the same thread told last.
+        if decision := _DECISION.search(line):
+            thread, identity, verb, key = decision.groups()
+            self._decided[thread] = f"{self._names.get(identity, identity)} {verb.lower()} {key}"
+        elif (dropped := _DROPPED.search(line)) and (what := self._decided.pop(dropped[1], None)):
+            self._count(what)
+        elif rejected := _REJECTED.search(line):
+            self._count(f"{STRANGER} ({rejected[1]})")
 
     def _remember(self, identity: str, name: str) -> None:
         """Keeps the name beyond the end of the link: the log tells of it a little later."""

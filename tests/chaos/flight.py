@@ -80,7 +80,6 @@ class ChaosFlight(Swarm):
         self._protocol = protocol
         self._routed = routed
         super().__init__(scenario, hand, folder, overrides)
-        self.formation = build_formation(self.scenario)
         self.nodes = all_nodes(self.formation)
         common = ("--scenario", str(folder / "scenario.toml"))
         self.add(BRIDGE, "glove_bridge", *common, "--glove", f"record://{folder / 'glove.jsonl'}")

@@ -36,7 +36,7 @@ class Swarm:
 
     def __init__(self, name: str, hand: str, folder: Path, overrides: Sequence[str] = ()) -> None:
         raw = load_scenario(name, overrides)
-        formation = build_formation(raw)
+        self.formation = formation = build_formation(raw)
         self.scenario = self.place(raw, formation)
         self.ids = formation.ids
         self._folder = folder
@@ -115,6 +115,11 @@ class Swarm:
         for process in self.processes.values():
             process.terminate()
         return {token: process.wait(10.0) for token, process in self.processes.items()}
+
+    def referee(self) -> dict[str, Any]:
+        """Returns what the simulated world saw."""
+        report: dict[str, Any] = json.loads((self._folder / "referee.json").read_text(encoding="utf-8"))
+        return report
 
     def logs(self) -> str:
         """Returns what all processes have logged."""

@@ -96,8 +96,8 @@ def test_an_agent_that_stays_dead_loses_its_body_and_rejoins_from_the_ground(tmp
         )
         assert {height for t, height in seen if t > CUT_S + 1.5} == {0.0}, "then it falls"
         followers = [recorder.latest(drone) for drone in (2, 3, 4)]
-        assert {state.mode for state in followers} == {Mode.HOLD}
-        assert all(Flag.REFERENCE_LOST in state.flags for state in followers[:2])
+        assert {state.mode for state in followers} == {Mode.FOLLOW}
+        assert [Flag.REPAIRED in state.flags for state in followers] == [True, True, False]
         assert all(state.position[2] > 0.8 for state in followers)
 
         swarm.start("drone/1")

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from agents.control.goals import all_rows, goals
 from agents.control.hand import HandInput, HandSettings, map_hand
 from agents.control.projection import project_exact
+from agents.control.single.vectors import ORIGIN, vector
 from shared.flight_folder import HAND_FILE, Meta, read_meta, read_obstacles, read_setpoints, read_track
 from shared.formation import build_formation
 from shared.scenario import FormationSettings, Hand, Scenario
@@ -62,14 +63,14 @@ def predict(folder: Path, meta: Meta) -> tuple[Ints, Vec, Vec]:
     formation = build_formation(scenario)
     settings = HandSettings(
         hand=scenario.hand,
-        low=np.array([*meta.low, -np.inf]),
-        high=np.array([*meta.high, np.inf]),
+        low=vector([*meta.low, -np.inf]),
+        high=vector([*meta.high, np.inf]),
         radius=formation.radius,
     )
     hand, rows, still = read_track(folder / HAND_FILE), all_rows(formation), np.zeros((3, 3))
 
     def wanted(position: Vec) -> Vec:
-        sample = HandInput(position=position, velocity=np.zeros(3), yaw=0.0, stamp=0.0)
+        sample = HandInput(position=vector(position), velocity=ORIGIN, yaw=0.0, stamp=0.0)
         references = np.vstack((map_hand(None, sample, settings).point, still))
         return goals(rows, references, still, 0.0)[:, :2]
 

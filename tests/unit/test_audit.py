@@ -4,13 +4,16 @@ from shared.clock import NS_PER_S
 from shared.net.audit import MAX_NAMES, OTHERS, Audit
 
 ZID = "3551f63a5eee554bf53356f9eeea927f"
-CACHED = (
-    f"TRACE zenoh::access_control: Using cached result: {ZID} is unauthorized to Put (ingress) on s/human/hand"
+DECIDED = (
+    f"TRACE ThreadId(14) zenoh::access_control: Using cached result: {ZID} is unauthorized to Put (ingress) on"
+    " s/human/hand"
 )
 FIRST = (
-    f"TRACE rx-1 zenoh::access_control: {ZID} on Interface(lo)+CertCommonName(drone/2)+Transport(Quic)+{ZID}"
+    f"TRACE rx-1 ThreadId(14) zenoh::access_control: {ZID} on Interface(lo)+CertCommonName(drone/2)+{ZID}"
     " is unauthorized to Put (ingress) on s/human/hand"
 )
+DROPPED = "TRACE rx-1 ThreadId(14) zenoh::net::routing::interceptor: Msg intercepted!"
+REFUSED = f"{DECIDED}\n{DROPPED}"
 STRANGER_LOG = (
     'WARN acc-0 zenoh_link_commons: QUIC acceptor failed: TransportError(Error { reason: "invalid'
     ' peer certificate: BadSignature" })'
@@ -40,15 +43,21 @@ def test_refused_messages_are_counted_under_the_name_in_the_certificate() -> Non
     watched = audit()
     watched.linked(ZID, "drone/2", present=True)
     watched.linked(ZID, "drone/2", present=False)  # the log comes a little later than the end of the link
-    watched.read(f"{FIRST}\n{FIRST}\n{CACHED}\n{CACHED}")
+    watched.read(f"{FIRST}\n{FIRST}\n{DROPPED}\n{REFUSED}\n{REFUSED}")
     assert watched.metrics() == {"refused drone/2 put s/human/hand": 3.0}
+
+
+def test_a_decision_without_a_message_is_not_counted() -> None:
+    watched = audit()
+    watched.read(f"{FIRST}\n{DROPPED.replace('(14)', '(15)')}")
+    assert watched.metrics() == {}
 
 
 def test_what_is_authorized_or_leaves_is_not_counted() -> None:
     watched = audit()
-    watched.read(CACHED.replace("unauthorized", "authorized"))
-    watched.read(CACHED.replace("ingress", "egress"))
-    watched.read(CACHED.replace("Put", "Query"))
+    watched.read(REFUSED.replace("unauthorized", "authorized"))
+    watched.read(REFUSED.replace("ingress", "egress"))
+    watched.read(REFUSED.replace("Put", "Query"))
     assert watched.metrics() == {}
 
 
@@ -62,9 +71,9 @@ def test_strangers_are_counted_by_reason() -> None:
 
 def test_refusals_are_reported_once_a_second_and_only_the_news() -> None:
     watched = audit()
-    watched.read(CACHED)
+    watched.read(REFUSED)
     assert watched.report(NS_PER_S) == f"{ZID} put s/human/hand (1 times)"
-    watched.read(f"{CACHED}\n{CACHED}")
+    watched.read(f"{REFUSED}\n{REFUSED}")
     assert watched.report(NS_PER_S + NS_PER_S // 2) is None
     assert watched.report(2 * NS_PER_S) == f"{ZID} put s/human/hand (2 times)"
     assert watched.report(3 * NS_PER_S) is None

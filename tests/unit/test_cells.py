@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from deploy.lockstep.cells import near_pairs
+from shared.cells import near_pairs
 
 COORDINATE = st.floats(-4.0, 4.0)
 

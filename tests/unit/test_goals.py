@@ -164,7 +164,7 @@ def test_a_correction_never_leads_towards_the_human_and_has_its_bound(shape: str
     rows = all_rows(formation)
     correction, _ = corrections(rows, state)
     assert (correction[:, 0] <= 0.0).all()
-    assert (np.abs(correction) <= rows.scale * (rows.incidence @ rows.limits) + 1e-12).all()
+    assert (np.abs(correction) <= rows.scale * rows.sum_links(rows.limits) + 1e-12).all()
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -92,6 +92,18 @@ def test_the_same_inputs_give_the_same_bytes() -> None:
     assert digest() == digest()
 
 
+@pytest.mark.parametrize("law", ["paper", "stable"])
+def test_messages_fly_as_their_bytes_do(law: str) -> None:
+    scenario = load_scenario("rhombus", [f"swarm.law={law}"])
+    formation, hand = build_formation(scenario), stroke(np.pi, 0.5, 1.0, after=0.5)
+    as_bytes, as_they_are = (
+        fly_lockstep(scenario, formation, hand, airborne=False, encoded=encoded) for encoded in (True, False)
+    )
+    assert np.ptp(as_bytes.position[..., 2]) > 0.5
+    for name in ("position", "goal", "setpoint", "displacement"):
+        assert np.array_equal(getattr(as_bytes, name), getattr(as_they_are, name)), name
+
+
 def test_it_takes_off_from_the_ground_follows_and_lands() -> None:
     scenario = load_scenario("rhombus")
     formation = build_formation(scenario)

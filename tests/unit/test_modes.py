@@ -17,6 +17,7 @@ CALM = ModeInputs(
     wish=Wish.FLY,
     hand_age=0.0,
     pose_age=0.0,
+    battery=1.0,
     height=TAKEOFF_HEIGHT,
     takeoff_height=TAKEOFF_HEIGHT,
     references_follow=True,

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from deploy.cli import main
 from deploy.net.authority import create, issue
+from shared.codec import MAX_PAYLOAD
 from shared.config import load_scenario
 from shared.errors import ConfigError, SwarmTouchError
 from shared.formation import build_formation
@@ -78,7 +79,7 @@ def test_the_field_has_certificates_rules_and_guards(field: Scenario) -> None:
     assert tls["listen_private_key"].endswith("drone-2.key")
     assert settings["transport"]["link"]["protocols"] == ["quic"]
     assert settings["access_control"]["enabled"]
-    assert settings["low_pass_filter"][0]["size_limit"] == 4096
+    assert settings["low_pass_filter"][0]["size_limit"] > MAX_PAYLOAD
 
 
 def test_a_node_without_its_key_is_told_where_to_get_it(field: Scenario, tmp_path: Path) -> None:
@@ -111,6 +112,7 @@ def test_on_the_radio_the_relay_has_no_other_link_and_nobody_else_speaks_there()
     assert relay["connect"]["endpoints"] == []
     mesh, ear = node_settings(radio, RHOMBUS, "drone/2")
     assert mesh["listen"]["endpoints"] == ["tcp/127.0.0.1:7462"]
+    assert mesh["connect"]["endpoints"] == ["tcp/127.0.0.1:7461"]
     assert ear["listen"] == relay["listen"]
     assert ear["connect"]["endpoints"] == []
 

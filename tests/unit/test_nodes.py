@@ -11,7 +11,6 @@ from shared.config import load_scenario, structure_scenario
 from shared.formation import Formation, build_formation
 from shared.nodes import (
     BRIDGE,
-    FULL_MESH,
     NEAR,
     OBSERVER,
     RELAY,
@@ -25,6 +24,8 @@ from shared.nodes import (
 from shared.scenario import Scenario
 
 Swarm = tuple[Scenario, Formation]
+
+FULL_MESH = Scenario().net.full_mesh
 
 
 def swarm_of(shape: str, n: int, **settings: object) -> Swarm:
@@ -70,10 +71,10 @@ def test_everybody_who_must_talk_is_linked(swarm: Swarm) -> None:
 @given(swarm=SWARMS)
 @settings(max_examples=30)
 def test_whoever_hears_a_drone_is_linked_to_it(swarm: Swarm) -> None:
-    _, formation = swarm
+    scenario, formation = swarm
     found = set(links(swarm))
     for drone in formation.ids:
-        heard = neighbours(formation, drone)
+        heard = neighbours(scenario, formation, drone)
         assert drone not in heard
         assert list(heard) == sorted(heard)
         assert all(frozenset((drone_node(drone), drone_node(other))) in found for other in heard)
@@ -81,19 +82,19 @@ def test_whoever_hears_a_drone_is_linked_to_it(swarm: Swarm) -> None:
 
 @pytest.mark.parametrize("n", [1, 2, FULL_MESH])
 def test_a_small_swarm_hears_everybody(n: int) -> None:
-    _, formation = swarm_of("line", n)
+    scenario, formation = swarm_of("line", n)
     for drone in formation.ids:
-        assert set(neighbours(formation, drone)) == set(formation.ids) - {drone}
+        assert set(neighbours(scenario, formation, drone)) == set(formation.ids) - {drone}
 
 
 def test_a_large_swarm_hears_ancestors_and_those_near() -> None:
-    _, formation = swarm_of("grid", 36)
+    scenario, formation = swarm_of("grid", 36)
     assert len(formation.ids) > FULL_MESH
     for one, other in itertools.permutations(formation.ids, 2):
         gap = math.dist(formation.rest[formation.row(one)], formation.rest[formation.row(other)])
         expected = gap <= NEAR or other in formation.ancestors(one)
-        assert (other in neighbours(formation, one)) == expected
-    assert any(len(neighbours(formation, drone)) < len(formation.ids) - 1 for drone in formation.ids)
+        assert (other in neighbours(scenario, formation, one)) == expected
+    assert any(len(neighbours(scenario, formation, drone)) < len(formation.ids) - 1 for drone in formation.ids)
 
 
 def test_the_world_is_no_member_of_the_swarm() -> None:

@@ -19,7 +19,8 @@ from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 from tests.strategies import garbage
 
-FORMATION = build_formation(load_scenario("rhombus"))
+SCENARIO = load_scenario("rhombus")
+FORMATION = build_formation(SCENARIO)
 SAMPLE = HandSample(epoch=5, seq=10, stamp_ns=1, position=ORIGIN, velocity=ORIGIN, yaw=0.0, mode=Wish.FLY)
 STATE = DroneState(
     epoch=5,
@@ -38,7 +39,7 @@ SILENCE_NS = round(HAND.stale_s * NS_PER_S)
 
 
 def senses() -> Senses:
-    return Senses(neighbours(FORMATION, 4))
+    return Senses(neighbours(SCENARIO, FORMATION, 4))
 
 
 def hear(sensing: Senses, key: str, *messages: Message, at: int = 0) -> None:

@@ -46,6 +46,15 @@ def test_a_constant_velocity_is_exact_at_any_sampling(
     assert np.allclose(estimated[2:], velocity, atol=1e-8)
 
 
+@given(seed=st.integers(0, 999), gaps=gaps)
+def test_the_slope_is_that_of_the_least_squares_parabola(seed: int, gaps: list[float]) -> None:
+    positions = wander(seed, np.array(gaps))
+    times = np.cumsum(gaps)[-WINDOW:]
+    powers = np.vander((times - times[-1]) / (times[-1] - times[0]), 3, increasing=True)
+    fitted = np.linalg.lstsq(powers, positions[-WINDOW:])[0][1] / (times[-1] - times[0])
+    assert np.allclose(estimate(positions, np.array(gaps))[-1], fitted, atol=1e-9)
+
+
 def test_a_constant_acceleration_is_exact_once_the_window_is_full() -> None:
     t = np.arange(20) / 60
     positions = np.outer(0.5 * t**2, (1.0, -2.0, 0.5))

@@ -11,6 +11,7 @@ import pytest
 from agents.vehicles.bodies.fleet import park_fleet
 from agents.vehicles.bodies.state import Command
 from agents.vehicles.link import Verb, decode_pose, encode_order
+from agents.vehicles.world.faults import faults_of
 from agents.vehicles.world.hand import HandWatch
 from agents.vehicles.world.radio import Radio
 from agents.vehicles.world.record import RefereeFile
@@ -22,6 +23,7 @@ from shared.config import structure_scenario
 from shared.errors import ConfigError, DeviceError
 from shared.memory_bus import MemoryBus, MemoryNetwork
 from shared.messages import HandSample, Wish
+from shared.scenario import VehicleSettings
 from shared.topics import HAND
 
 IDS = (1, 2)
@@ -192,3 +194,34 @@ def _hand(seq: int, x: float) -> HandSample:
     return HandSample(
         epoch=1, seq=seq, stamp_ns=0, position=(x, 0.0, 1.2), velocity=(0.0, 0.0, 0.0), yaw=0.0, mode=Wish.FLY
     )
+
+
+def test_injected_faults_drain_the_battery_and_keep_poses_back() -> None:
+    kinds = [
+        VehicleSettings(battery=0.5, endurance=10.0),
+        VehicleSettings(pose_silence=(2.0, 1.5)),
+    ]
+    faults = faults_of(kinds)
+    assert faults.left(np.array([2.0, 2.0])) == pytest.approx([0.3, 1.0])
+    assert faults.left(np.array([60.0, 60.0])) == pytest.approx([0.0, 1.0])
+    assert [faults.mute(t).tolist() for t in (0.0, 2.0, 3.4, 3.5)] == [
+        [False, False],
+        [False, True],
+        [False, True],
+        [False, False],
+    ]
+
+
+def test_a_mute_vehicle_sends_no_pose_and_an_old_battery_shows_in_the_others(
+    radio: Radio, driver: socket.socket
+) -> None:
+    fleet = park_fleet({1: "identified", 2: "identified"}, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    for drone in IDS:
+        driver.send(encode_order(drone, Verb.HELLO))
+    radio.receive(10.0)
+    radio.send(fleet, np.array([1.0, 0.25]), np.array([True, False]), 7)
+    drone, pose = decode_pose(driver.recv(256))
+    assert (drone, pose.battery, pose.seq) == (2, 0.25, 7)
+    driver.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        driver.recv(256)

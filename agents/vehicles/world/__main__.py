@@ -41,7 +41,7 @@ def main() -> int:
     clock = system_clock()
     with radio, bus, RefereeFile(arguments.run_dir) as report:
         hand, status = HandWatch(bus, clock, verify), StatusReporter(bus, WORLD, 0, clock)
-        world = World(setup.fleet, radio, setup.rules, time.monotonic())
+        world = World(setup.fleet, radio, setup.rules, time.monotonic(), setup.faults)
         while not stopping.wait(max(0.0, world.next_tick - time.monotonic())):
             world.run_until(time.monotonic(), hand.position())
             report.write_when_due(time.monotonic(), world.metrics)

@@ -10,7 +10,7 @@ import numpy as np
 from agents.vehicles.base import Pose
 from agents.vehicles.bodies.fleet import Fleet
 from agents.vehicles.bodies.link_loss import apply_link_loss
-from agents.vehicles.bodies.state import Command, Commands, Mask
+from agents.vehicles.bodies.state import Command, Commands, Mask, Vec
 from agents.vehicles.link import MAX_DATAGRAM, Order, Verb, decode_order, encode_pose
 from shared.errors import DecodeError, DeviceError
 
@@ -88,19 +88,23 @@ class Radio:
         kind = apply_link_loss(self._kind, now - self._commanded, self._hovers)
         return Commands(kind, self._setpoint)
 
-    def send(self, fleet: Fleet, seq: int) -> None:
+    def send(self, fleet: Fleet, charge: Vec, mute: Mask, seq: int) -> None:
         """Sends every drone's pose to its driver.
 
         Args:
             fleet: The bodies now.
+            charge: (N,) of their batteries, 0..1.
+            mute: (N,) whose pose does not come.
             seq: Number of this report.
         """
         airborne = fleet.airborne
         for drone, driver in self._drivers.items():
             row = self._row[drone]
+            if mute[row]:
+                continue
             x, y, z = fleet.position[row].tolist()
             vx, vy, vz = fleet.velocity[row].tolist()
-            pose = Pose((x, y, z), (vx, vy, vz), 0.0, 1.0, bool(airborne[row]), seq)
+            pose = Pose((x, y, z), (vx, vy, vz), 0.0, float(charge[row]), bool(airborne[row]), seq)
             try:
                 self._socket.sendto(encode_pose(drone, pose), driver)
             except OSError:

@@ -6,6 +6,7 @@ from attrs import frozen
 from agents.vehicles.bodies.fleet import Fleet, park_fleet
 from agents.vehicles.bodies.state import Mask, Vec
 from agents.vehicles.sim import parse_uri
+from agents.vehicles.world.faults import Faults, faults_of
 from agents.vehicles.world.referee import Rules
 from shared.config import vehicle_settings
 from shared.errors import ConfigError
@@ -24,6 +25,7 @@ class Setup:
         hovers: (N,) rows that follow the link-loss rule `hover`.
         address: Host and port that their drivers expect.
         rules: What the referee counts.
+        faults: What the scenario makes fail.
     """
 
     formation: Formation
@@ -31,6 +33,7 @@ class Setup:
     hovers: Mask
     address: tuple[str, int]
     rules: Rules
+    faults: Faults
 
 
 def plan_world(scenario: Scenario) -> Setup:
@@ -52,6 +55,7 @@ def plan_world(scenario: Scenario) -> Setup:
         hovers=np.array([s.link_loss == "hover" for s in simulated.values()], dtype=bool),
         address=_address({drone: str(s.uri) for drone, s in simulated.items()}),
         rules=referee_rules(scenario, formation, fleet.ids),
+        faults=faults_of(list(simulated.values())),
     )
 
 

@@ -1,9 +1,13 @@
 """The world's clock: takes commands, advances all bodies, tells their drivers and the referee."""
 
+import numpy as np
+
 from agents.vehicles.bodies.fleet import Fleet, advance_fleet
 from agents.vehicles.bodies.state import Vec
+from agents.vehicles.world.faults import Faults, faults_of
 from agents.vehicles.world.radio import Radio
 from agents.vehicles.world.referee import Rules, report, start_referee, update
+from shared.scenario import VehicleSettings
 
 TICK = 0.01
 """Simulated time per tick, s: poses stream at 100 Hz, bodies step finer than that."""
@@ -20,6 +24,7 @@ class World:
         radio: Their links.
         rules: What the referee counts.
         now: Monotonic time of the start, s.
+        faults: What fails; None for nothing.
 
     Attributes:
         fleet: The bodies at the last tick.
@@ -27,12 +32,16 @@ class World:
         lost_time: Simulated time given up because the machine was too slow, s.
     """
 
-    def __init__(self, fleet: Fleet, radio: Radio, rules: Rules, now: float) -> None:
+    def __init__(
+        self, fleet: Fleet, radio: Radio, rules: Rules, now: float, faults: Faults | None = None
+    ) -> None:
         self.fleet = fleet
         self.ticks = 0
         self.lost_time = 0.0
         self._radio = radio
         self._rules = rules
+        self._faults = faults or faults_of([VehicleSettings()] * len(fleet.ids))
+        self._flown = np.zeros(len(fleet.ids))
         self._referee = start_referee(rules)
         self._start = self._next = now
         # Poses of a restarted world must not repeat the numbers of the one before.
@@ -66,8 +75,10 @@ class World:
 
     def _tick(self, now: float, hand: Vec | None) -> None:
         self.fleet = advance_fleet(self.fleet, self._radio.commands(now), TICK)
-        self._radio.send(self.fleet, self._first_seq + self.ticks)
         t = now - self._start
+        self._flown += TICK * self.fleet.airborne
+        charge, mute = self._faults.left(self._flown), self._faults.mute(t)
+        self._radio.send(self.fleet, charge, mute, self._first_seq + self.ticks)
         self._referee = update(
             self._rules, self._referee, self.fleet.position, self.fleet.airborne, hand=hand, t=t
         )

@@ -3,8 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from shared.formation import Vec
-
+Vec = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.intp]
 
 

@@ -1,0 +1,246 @@
+"""What stands in for a reference that is gone: the goal that its own row would give (DESIGN section 5).
+
+A drone keeps the rows of all its ancestors in the reference graph. Once a reference is silent for too long, or
+lands by itself, its place is computed from its own references and links, up to the human if need be. A stand-in
+takes over, and gives back, step by step within a second; who returns has to be heard for a while first.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from attrs import frozen
+
+from agents.control import modes
+from agents.control.hand import MappedHand
+from agents.control.single.goals import Row, goal_of
+from agents.control.single.impedance import AT_REST, LinkState, step_links
+from agents.control.single.vectors import Vector, norm
+from shared.messages import Mode
+
+REFERENCE_LOST = 0.5
+"""A reference unheard for this long is lost, s."""
+EXTRAPOLATION = 0.25
+"""A silent reference is extrapolated by at most this, m."""
+BLEND = 1.0
+"""A stand-in takes over, and gives back, within this time, s."""
+RETURN_AFTER = 1.0
+"""A reference that is back is trusted after it has been heard for this long, s."""
+LEAVING_MODES = frozenset({Mode.LAND, Mode.STOP})
+"""A reference in one of these no longer shows where the formation goes."""
+
+
+@frozen(kw_only=True)
+class Kin:
+    """One ancestor in the reference graph.
+
+    Attributes:
+        drone: Its number.
+        row: Its row of the formation.
+        references: Its own references, as places in the tuple of kin.
+        heights: Rest heights of those above the hand, m; None uses their actual ones.
+    """
+
+    drone: int
+    row: Row
+    references: tuple[int, ...]
+    heights: tuple[float, ...] | None
+
+
+class Reference(NamedTuple):
+    """An ancestor as last heard.
+
+    Attributes:
+        point: Its position (`paper`) or goal (`stable`), m.
+        velocity: The rate of that, m/s.
+        goal_velocity: Its broadcast goal velocity, m/s.
+        mode: Its mode.
+        age: Time since its sample arrived, s.
+        fresh: Whether the sample is newer than the one of the last step.
+    """
+
+    point: Vector
+    velocity: Vector
+    goal_velocity: Vector
+    mode: Mode
+    age: float
+    fresh: bool
+
+
+class StandIn(NamedTuple):
+    """How far an ancestor has been replaced.
+
+    Attributes:
+        share: 0: it speaks for itself; 1: its stand-in does.
+        heard_for: How long it has been fit to lead without a gap, s.
+        links: Its links, simulated while the stand-in has a share.
+    """
+
+    share: float
+    heard_for: float
+    links: tuple[LinkState, ...]
+
+
+class Guide(NamedTuple):
+    """What a drone follows in the place of one ancestor.
+
+    Attributes:
+        point: Where it is, or should be, m.
+        velocity: Its goal velocity, m/s.
+        follows: Whether it follows the hand, or whoever stands behind it does.
+    """
+
+    point: Vector
+    velocity: Vector
+    follows: bool
+
+
+def nobody_gone(kin: Sequence[Kin]) -> tuple[StandIn, ...]:
+    """Returns the state in which every ancestor speaks for itself."""
+    return tuple(StandIn(0.0, 0.0, (AT_REST,) * len(each.row.links)) for each in kin)
+
+
+def is_fit(reference: Reference | None) -> bool:
+    """Says whether an ancestor is heard and part of the formation."""
+    return reference is not None and reference.age <= REFERENCE_LOST and reference.mode in modes.GUIDED_MODES
+
+
+def replace_lost(
+    stand_ins: Sequence[StandIn],
+    kin: Sequence[Kin],
+    heard: Sequence[Reference | None],
+    hand_velocity: Vector,
+    dt: float,
+) -> tuple[StandIn, ...]:
+    """Advances every ancestor's stand-in by one step.
+
+    Args:
+        stand_ins: Before, one per ancestor.
+        kin: The ancestors.
+        heard: What is known of each; None where never heard.
+        hand_velocity: Mapped hand velocity in the formation's frame, m/s.
+        dt: Time since the last step, s.
+    """
+    return tuple(
+        _advance(stand_in, each, reference, hand_velocity, dt)
+        for stand_in, each, reference in zip(stand_ins, kin, heard, strict=True)
+    )
+
+
+def _advance(
+    stand_in: StandIn, kin: Kin, reference: Reference | None, hand_velocity: Vector, dt: float
+) -> StandIn:
+    share, heard_for, links = stand_in
+    heard_for = heard_for + dt if is_fit(reference) else 0.0
+    if _is_gone(reference):
+        # Nothing to blend from if it was never there.
+        share = 1.0 if reference is None else min(share + dt / BLEND, 1.0)
+    elif share > 0.0:
+        rising = heard_for < RETURN_AFTER
+        share = min(share + dt / BLEND, 1.0) if rising else max(share - dt / BLEND, 0.0)
+    if share == 0.0:
+        return StandIn(0.0, heard_for, (AT_REST,) * len(links))
+    return StandIn(share, heard_for, step_links(links, kin.row.links, hand_velocity, dt))
+
+
+def _is_gone(reference: Reference | None) -> bool:
+    return reference is None or reference.age > REFERENCE_LOST or reference.mode in LEAVING_MODES
+
+
+def guides(
+    stand_ins: Sequence[StandIn],
+    kin: Sequence[Kin],
+    heard: Sequence[Reference | None],
+    wanted: int,
+    hand: MappedHand,
+) -> list[Guide | None]:
+    """Returns whom to follow in the places of the first `wanted` ancestors, the direct references.
+
+    Args:
+        stand_ins: One per ancestor.
+        kin: The ancestors.
+        heard: What is known of each.
+        wanted: How many of them are direct references.
+        hand: The mapped hand, root of the graph.
+
+    Returns:
+        None in the place of an ancestor that is neither fit nor replaced: it has not joined yet.
+    """
+    known: dict[int, Guide | None] = {}
+    return [_guide(place, stand_ins, kin, heard, hand, known) for place in range(wanted)]
+
+
+def _guide(
+    place: int,
+    stand_ins: Sequence[StandIn],
+    kin: Sequence[Kin],
+    heard: Sequence[Reference | None],
+    hand: MappedHand,
+    known: dict[int, Guide | None],
+) -> Guide | None:
+    if place not in known:
+        reference, share = heard[place], stand_ins[place].share
+        own = _own(reference) if reference is not None and share > 0.0 else guide_of(reference)
+        if share > 0.0:
+            behind = [_guide(p, stand_ins, kin, heard, hand, known) for p in kin[place].references]
+            own = _blend(own, _stand_in(kin[place], stand_ins[place].links, behind, hand), share)
+        known[place] = own
+    return known[place]
+
+
+def guide_of(reference: Reference | None) -> Guide | None:
+    """Returns an ancestor that speaks for itself, None unless it is fit."""
+    return _own(reference) if reference is not None and is_fit(reference) else None
+
+
+def _own(reference: Reference) -> Guide:
+    return Guide(extrapolated(reference), reference.goal_velocity, reference.mode is Mode.FOLLOW)
+
+
+def _stand_in(
+    kin: Kin, links: tuple[LinkState, ...], behind: Sequence[Guide | None], hand: MappedHand
+) -> Guide | None:
+    """Returns the goal of an ancestor by its own row, None if one of its references has not joined yet."""
+    present = [guide for guide in behind if guide is not None]
+    if len(present) < len(behind):
+        return None
+    points, velocities = [guide.point for guide in present], [guide.velocity for guide in present]
+    point, velocity = goal_of(kin.row, links, hand, points, velocities, kin.heights)
+    return Guide(point, velocity, all(guide.follows for guide in present))
+
+
+def _blend(own: Guide | None, stand_in: Guide | None, share: float) -> Guide | None:
+    if own is None or stand_in is None:
+        return stand_in
+    return Guide(
+        _between(own.point, stand_in.point, share),
+        _between(own.velocity, stand_in.velocity, share),
+        stand_in.follows,
+    )
+
+
+def _between(a: Vector, b: Vector, share: float) -> Vector:
+    (x, y, z), (u, v, w) = a, b
+    return (x + share * (u - x), y + share * (v - y), z + share * (w - z))
+
+
+def extrapolated(reference: Reference) -> Vector:
+    """Returns where a silent reference would be by now, at most 0.25 m from where it was last."""
+    if reference.fresh:
+        return reference.point
+    length = norm(reference.velocity) * reference.age
+    seconds = reference.age if length <= EXTRAPOLATION else reference.age * (EXTRAPOLATION / length)
+    (x, y, z), (u, v, w) = reference.point, reference.velocity
+    return (x + u * seconds, y + v * seconds, z + w * seconds)
+
+
+def kin_order(references: Mapping[int, Sequence[int]], drone: int) -> tuple[int, ...]:
+    """Returns a drone's ancestors, its direct references first, each once.
+
+    Args:
+        references: The reference drones of every drone; a DAG.
+        drone: Whose ancestors.
+    """
+    order = list(references[drone])
+    for each in order:
+        order += [other for other in references[each] if other not in order]
+    return tuple(order)

@@ -1,0 +1,74 @@
+"""The reference trajectory of one drone, see `agents.control.trajectory`."""
+
+import math
+from typing import NamedTuple
+
+from agents.control.single.vectors import ORIGIN, Vector, shorten
+from agents.control.trajectory import BRAKING_SHARE
+
+
+class Trajectory(NamedTuple):
+    """Reference of one drone.
+
+    Attributes:
+        point: m.
+        velocity: m/s.
+        lead: Velocity that the set-point leads by, m/s.
+        goal: Goal of the last step, m.
+    """
+
+    point: Vector
+    velocity: Vector
+    lead: Vector
+    goal: Vector
+
+
+def start_at(point: Vector) -> Trajectory:
+    """Returns a trajectory at rest."""
+    return Trajectory(point, ORIGIN, ORIGIN, point)
+
+
+def tracking_velocity(trajectory: Trajectory, goal: Vector, dt: float, acceleration: float) -> Vector:
+    """Returns the velocity that reaches the goal at once, or closes in on it without overshoot.
+
+    Args:
+        trajectory: Reference before the step.
+        goal: Goal of this step, m.
+        dt: Step, s.
+        acceleration: Limit, m/s^2.
+    """
+    px, py, pz = trajectory.point
+    x, y, z = trajectory.goal
+    gx, gy, gz = goal
+    ex, ey, ez = x - px, y - py, z - pz
+    distance = math.hypot(ex, ey, ez)
+    if distance == 0.0:
+        return ((gx - x) / dt, (gy - y) / dt, (gz - z) / dt)
+    closing = min(distance / dt, math.sqrt(2.0 * BRAKING_SHARE * acceleration * distance))
+    share = closing / max(distance, 1e-12)
+    return ((gx - x) / dt + ex * share, (gy - y) / dt + ey * share, (gz - z) / dt + ez * share)
+
+
+def advance(
+    trajectory: Trajectory, goal: Vector, wanted: Vector, dt: float, speed: float, acceleration: float
+) -> Trajectory:
+    """Moves the reference with the wanted velocity as far as the limits allow.
+
+    Args:
+        trajectory: Reference before the step.
+        goal: Goal of this step, m.
+        wanted: Wanted velocity, m/s.
+        dt: Step, s.
+        speed: Limit, m/s.
+        acceleration: Limit, m/s^2.
+    """
+    u, v, w = velocity = approach(trajectory.velocity, shorten(wanted, speed), acceleration * dt)
+    x, y, z = trajectory.point
+    return Trajectory((x + u * dt, y + v * dt, z + w * dt), velocity, trajectory.lead, goal)
+
+
+def approach(velocity: Vector, wanted: Vector, largest: float) -> Vector:
+    """Changes a velocity towards a wanted one by at most `largest`, m/s."""
+    (u, v, w), (a, b, c) = velocity, wanted
+    du, dv, dw = shorten((a - u, b - v, c - w), largest)
+    return (u + du, v + dv, w + dw)

@@ -1,0 +1,226 @@
+"""Whoever does not belong is refused, named and counted; the flight does not notice."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import attrs
+import pytest
+import zenoh
+
+from deploy.net.authority import create, issue
+from shared.codec import encode
+from shared.messages import DroneState, HandSample, Mode, ProcessStatus
+from shared.net.keyring import Keyring
+from shared.net.settings import radio_settings
+from shared.nodes import all_nodes, drone_node, endpoint
+from shared.signature import blank, sign_with
+from shared.topics import DRONE_STATE, HAND
+from tests.integration.intruder import client_of, pour, session_of
+from tests.integration.recorder import START_S
+from tests.integration.swarm import Swarm, swarm_of
+
+FLOOD_HZ, FLOOD_S = 5000.0, 3.0
+CALM = "scripted:eight"
+VICTIM = "drone/1"
+NOTICE_S = 5.0
+"""A process tells its status once a second."""
+
+
+def keyring(folder: Path, nodes: tuple[str, ...]) -> Keyring:
+    made = Keyring(folder)
+    create(made, "rhombus")
+    for node in nodes:
+        issue(made, node)
+    return made
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Keyring:
+    nodes = ("relay", *(drone_node(i) for i in (1, 2, 3, 4)), "world", "bridge", "observer", "mallory")
+    made = keyring(tmp_path_factory.mktemp("keys") / "ours", nodes)
+    members = [node for node in made.members() if node != "mallory"]
+    (made.folder / "members.toml").write_text(f"members = {members}", encoding="utf-8")
+    return made
+
+
+@pytest.fixture(scope="module")
+def field(keys: Keyring, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Swarm]:
+    """One flight in the field profile; every test leaves it flying."""
+    overrides = ("net.profile=field", f"net.keys={keys.folder}")
+    with swarm_of("rhombus", CALM, tmp_path_factory.mktemp("field"), *overrides) as swarm:
+        swarm.fly()
+        yield swarm
+
+
+@pytest.fixture
+def unaffected(field: Swarm) -> Iterator[Swarm]:
+    """Demands that everybody follows the hand throughout a test."""
+    start_ns = field.recorder.clock()
+    yield field
+    field.recorder.listen(0.5)
+    for drone in field.ids:
+        states = field.recorder.since(drone, start_ns)
+        assert states
+        assert {state.mode for state in states} == {Mode.FOLLOW}
+        assert not any(state.flags & state.flags.HAND_STALE for state in states)
+
+
+def door(swarm: Swarm) -> str:
+    """Returns the endpoint of drone 1."""
+    return endpoint(swarm.scenario, swarm.formation, VICTIM)
+
+
+def wait_for(swarm: Swarm, condition: Callable[[ProcessStatus], bool]) -> ProcessStatus:
+    """Listens until the status of drone 1 fulfils a condition; returns it."""
+    statuses = swarm.recorder.statuses
+    swarm.recorder.until(lambda: VICTIM in statuses and condition(statuses[VICTIM]), NOTICE_S)
+    return statuses[VICTIM]
+
+
+def refused(swarm: Swarm, who: str) -> float:
+    """Returns how often drone 1 says that it has refused somebody."""
+    status = swarm.recorder.statuses.get(VICTIM)
+    return sum(n for name, n in status.metrics.items() if name.startswith(f"refused {who}")) if status else 0.0
+
+
+def newest_hand(swarm: Swarm) -> HandSample:
+    swarm.recorder.drain()
+    return swarm.recorder.hands[max(swarm.recorder.hands)]
+
+
+@pytest.mark.timeout(180)
+def test_everybody_is_linked_by_name(unaffected: Swarm) -> None:
+    members = {"relay", "drone/2", "drone/3", "drone/4", "observer"}
+    status = wait_for(unaffected, lambda s: {f"linked {m}" for m in members} <= set(s.metrics))
+    assert [name for name in status.metrics if name.startswith("refused")] == []
+
+
+def test_without_a_certificate_nobody_is_let_in(unaffected: Swarm, keys: Keyring) -> None:
+    with pytest.raises(zenoh.ZError), session_of(client_of(door(unaffected), keys, None)):
+        pass
+    wait_for(unaffected, lambda _: refused(unaffected, "a node without a certificate of ours (peer sent") >= 1)
+
+
+def test_the_second_swarm_of_the_same_name_has_other_keys_and_is_not_let_in(
+    unaffected: Swarm, keys: Keyring, tmp_path: Path
+) -> None:
+    theirs = keyring(tmp_path / "theirs", ("relay", "drone/2"))
+    for name in ("relay", "drone/2"):
+        with pytest.raises(zenoh.ZError), session_of(client_of(door(unaffected), keys, name, theirs)):
+            pass
+    wait_for(
+        unaffected, lambda _: refused(unaffected, "a node without a certificate of ours (invalid peer") >= 2
+    )
+
+
+def test_who_is_no_member_any_more_is_heard_by_nobody(unaffected: Swarm, keys: Keyring) -> None:
+    hand = encode(newest_hand(unaffected))
+    with session_of(client_of(door(unaffected), keys, "mallory")) as put:
+        pour(put, f"rhombus/{HAND.key()}", hand, rate_hz=100.0, seconds=0.5)
+        wait_for(unaffected, lambda status: "linked mallory" in status.metrics)
+        wait_for(unaffected, lambda _: refused(unaffected, f"mallory put rhombus/{HAND.key()}") >= 1)
+    assert refused(unaffected, "mallory") > refused(unaffected, "mallory put")
+
+
+def test_a_drone_cannot_speak_for_another(unaffected: Swarm, keys: Keyring) -> None:
+    lie = encode(attrs.evolve(unaffected.recorder.latest(3), position=(9.0, 9.0, 9.0), seq=2**60))
+    key = f"rhombus/{DRONE_STATE.key(id=3)}"
+    with session_of(client_of(door(unaffected), keys, "drone/2")) as put:
+        pour(put, key, lie, rate_hz=100.0, seconds=0.5)
+        wait_for(unaffected, lambda _: refused(unaffected, f"drone/2 put {key}") >= 10)
+
+
+def test_a_drone_cannot_play_the_hand_however_fast_it_tries(unaffected: Swarm, keys: Keyring) -> None:
+    lie = encode(attrs.evolve(newest_hand(unaffected), position=(9.0, 9.0, 9.0), seq=2**60))
+    key = f"rhombus/{HAND.key()}"
+    with session_of(client_of(door(unaffected), keys, "drone/2")) as put:
+        sent = pour(put, key, lie, rate_hz=FLOOD_HZ, seconds=FLOOD_S)
+        assert sent >= 0.5 * FLOOD_HZ * FLOOD_S
+        wait_for(unaffected, lambda _: refused(unaffected, f"drone/2 put {key}") >= 0.5 * sent)
+
+
+def test_with_the_stolen_key_of_the_relay_the_hand_is_still_signed(unaffected: Swarm, keys: Keyring) -> None:
+    """Replayed, unsigned, forged and oversized samples pass the rules and are told apart by the agent."""
+    hand = newest_hand(unaffected)
+    before = dict(unaffected.recorder.statuses[VICTIM].rejected)
+    replayed = sign_with(keys.hand_private)(encode(attrs.evolve(hand, signature=blank())))
+    newer = attrs.evolve(hand, seq=2**60, position=(9.0, 9.0, 9.0))
+    samples = {
+        "out-of-order": replayed,
+        "unsigned": encode(attrs.evolve(newer, signature=None)),
+        "bad-signature": encode(attrs.evolve(newer, signature=blank())),
+        "oversized": encode(newer) + bytes(8000),
+    }
+    with session_of(client_of(door(unaffected), keys, "relay")) as put:
+        for payload in samples.values():
+            pour(put, f"rhombus/{HAND.key()}", payload, rate_hz=50.0, seconds=0.2)
+        for reason in samples:
+            wait_for(unaffected, lambda s, r=reason: s.rejected.get(r, 0) > before.get(r, 0))  # type: ignore[misc]
+
+
+def test_refusals_are_logged_with_a_name_at_a_limited_rate(field: Swarm) -> None:
+    lines = [line for line in field.logs().splitlines() if "refused: " in line]
+    assert any("drone/2 put rhombus/human/hand" in line for line in lines)
+    assert any("mallory" in line for line in lines)
+    assert len(lines) < 100
+
+
+def test_no_secret_is_in_a_log_or_a_command_line(field: Swarm, keys: Keyring) -> None:
+    secrets = [file.read_text().splitlines()[1] for file in keys.folder.glob("*.key")]
+    assert len(secrets) >= 9
+    seen = field.logs()
+    for process in field.processes.values():
+        seen += Path(f"/proc/{process.pid}/cmdline").read_text()
+    assert not [secret for secret in secrets if secret in seen]
+
+
+def test_the_referee_saw_nothing_unusual(field: Swarm) -> None:
+    field.land()
+    assert set(field.end().values()) == {0}
+    report = field.referee()
+    assert report["collisions"] == 0
+    assert report["fence_exits"] == 0
+    assert report["min_distance_m"] > 0.35
+
+
+def pour_until_counted(swarm: Swarm, put: Callable[[str, bytes], None], reason: str, payload: bytes) -> None:
+    """Sends a sample until drone 1 tells of having refused it: on a radio, who is new is not heard at once."""
+    for _ in range(20):
+        pour(put, f"rhombus/{HAND.key()}", payload, rate_hz=50.0, seconds=0.5)
+        swarm.recorder.drain()
+        if swarm.recorder.statuses[VICTIM].rejected.get(reason):
+            return
+    pytest.fail(f"{reason} not counted: {swarm.recorder.statuses[VICTIM].rejected}")
+
+
+@pytest.mark.timeout(180)
+def test_on_the_radio_only_the_signature_counts(keys: Keyring, tmp_path: Path) -> None:
+    """A second swarm on the same group: other keys, unsigned samples, and a recording of ours."""
+    theirs = keyring(tmp_path / "theirs", ())
+    overrides = ("net.profile=radio", f"net.keys={keys.folder}")
+    folder = tmp_path / "flight"
+    folder.mkdir()
+    with swarm_of("rhombus", CALM, folder, *overrides) as swarm:
+        swarm.fly()
+        hand = newest_hand(swarm)
+        lie = attrs.evolve(hand, seq=2**60, position=(9.0, 9.0, 9.0), signature=blank())
+        genuine = sign_with(keys.hand_private)(encode(attrs.evolve(hand, signature=blank())))
+        forged = sign_with(theirs.hand_private)(encode(lie))
+        before: list[DroneState] = [swarm.recorder.latest(drone) for drone in swarm.ids]
+        settings = radio_settings(swarm.scenario)
+        del settings["namespace"]
+        samples = {
+            "out-of-order": genuine,
+            "bad-signature": forged,
+            "unsigned": encode(attrs.evolve(lie, signature=None)),
+        }
+        with session_of(settings) as put:
+            for reason, payload in samples.items():
+                pour_until_counted(swarm, put, reason, payload)
+        for drone, then in zip(swarm.ids, before, strict=True):
+            assert {s.mode for s in swarm.recorder.since(drone, then.step_ns)} == {Mode.FOLLOW}
+        swarm.recorder.until(lambda: swarm.recorder.all_in(Mode.FOLLOW), START_S)
+
+
+def test_every_node_of_the_rhombus_has_been_issued_a_key(field: Swarm, keys: Keyring) -> None:
+    assert set(all_nodes(field.formation)) <= set(keys.members())

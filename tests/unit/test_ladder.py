@@ -1,0 +1,110 @@
+"""The failure ladder as a whole: whatever falls silent, returns or is wished, the drone stays within its limits
+and, but for STOP, comes back."""
+
+import itertools
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agents.control.modes import AIRBORNE_MODES
+from agents.control.steering import ESCAPE_ACCELERATION, HAND_SPEED_FACTOR, LONGEST_STEP
+from agents.control.step import Inputs, Settings, State, start, step
+from shared.messages import Mode, Vector, Wish
+from tests.unit.test_step import REST, TICK, drones, hand, inputs, reference, settings, towards
+
+CALM_S, REST_S = 1.0, 12.0
+HAND_SPEED = 1.5
+BODY_SHARE = 0.3
+"""How much of the way to its set-point the body covers in one step."""
+
+ages = st.sampled_from([0.0, 0.05, 0.2, 0.4, 0.6, 2.0, 11.0, math.inf])
+places = st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.0, 2.5))
+speeds = st.tuples(*[st.floats(-0.8, 0.8)] * 3)
+known = st.none() | st.builds(
+    reference,
+    places,
+    velocity=speeds,
+    goal_velocity=speeds,
+    mode=st.sampled_from(Mode),
+    age=ages,
+    fresh=st.booleans(),
+)
+moments = st.fixed_dictionaries(
+    {
+        "pose_age": st.sampled_from([0.0, 0.2, 0.6, 3.0]),
+        "battery": st.sampled_from([1.0, 1.0, 0.15, 0.05]),
+        "hand": st.none()
+        | st.builds(hand, st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), speeds, st.floats(0.0, 9.0)),
+        "wish": st.sampled_from([Wish.FLY, Wish.FLY, Wish.HOLD, Wish.GROUND, Wish.LAND]),
+        "hand_age": ages,
+        "hand_fresh": st.booleans(),
+        "references": st.tuples(known, known, known),
+        "drones": st.lists(places, max_size=3).map(lambda found: drones(*found)),
+    }
+)
+lives = st.lists(st.tuples(moments, st.integers(1, 40)), min_size=1, max_size=8)
+
+
+class Life:
+    """One drone whose body goes part of the way to its set-point in every step."""
+
+    def __init__(self, rules: Settings, *, airborne: bool) -> None:
+        self.rules = rules
+        self.position: Vector = REST[4] if airborne else (*REST[4][:2], 0.0)
+        self.state: State = start(self.position, rules, airborne=airborne)
+        self.setpoints: list[tuple[Mode, Vector]] = []
+
+    def live(self, now: Inputs, seconds: float) -> None:
+        for _ in range(max(1, round(seconds / TICK))):
+            self.state, output = step(self.state, now._replace(position=self.position), self.rules, TICK)
+            mode = self.state.mode.mode
+            self.setpoints.append((mode, output.setpoint))
+            goal = output.setpoint if mode in AIRBORNE_MODES else (*self.position[:2], 0.0)
+            self.position = towards(self.position, goal, BODY_SHARE)
+
+
+def lived(rules: Settings, story: list[tuple[dict[str, Any], int]], *, airborne: bool) -> Life:
+    life = Life(rules, airborne=airborne)
+    for moment, ticks in story:
+        life.live(inputs(4)._replace(**moment), ticks * TICK)
+    return life
+
+
+@pytest.mark.parametrize("law", ["paper", "stable"])
+@given(story=lives, airborne=st.booleans())
+def test_no_sequence_moves_the_set_point_faster_than_the_limits(
+    law: str, story: list[tuple[dict[str, Any], int]], airborne: bool
+) -> None:
+    rules = settings(4, f"swarm.law={law}")
+    life = lived(rules, story, airborne=airborne)
+    limits, tau = rules.steering.limits, rules.steering.tau
+    fastest = max(limits.speed, HAND_SPEED_FACTOR * HAND_SPEED)
+    lead = tau * ESCAPE_ACCELERATION * limits.acceleration
+    for (before, a), (after, b) in itertools.pairwise(life.setpoints):
+        if before in AIRBORNE_MODES and after in AIRBORNE_MODES:
+            assert math.dist(a, b) <= (fastest + lead) * min(TICK, LONGEST_STEP) + 1e-9
+
+
+@pytest.mark.parametrize("law", ["paper", "stable"])
+@given(story=lives, airborne=st.booleans())
+def test_every_state_but_stop_is_left_once_all_is_well_and_the_operator_asks(
+    law: str, story: list[tuple[dict[str, Any], int]], airborne: bool
+) -> None:
+    life = lived(settings(4, f"swarm.law={law}"), story, airborne=airborne)
+    life.live(inputs(4, wish=Wish.HOLD), CALM_S)
+    life.live(inputs(4), REST_S)
+    assert life.state.mode.mode is Mode.FOLLOW
+    assert all(each.share == 0.0 for each in life.state.stand_ins)
+    assert life.setpoints[-1][1] == pytest.approx(REST[4], abs=0.02)
+
+
+@given(story=lives)
+def test_stop_is_never_left(story: list[tuple[dict[str, Any], int]]) -> None:
+    life = Life(settings(4), airborne=True)
+    life.live(inputs(4, wish=Wish.STOP), TICK)
+    for moment, ticks in story:
+        life.live(inputs(4)._replace(**moment), ticks * TICK)
+        assert life.state.mode.mode is Mode.STOP
