@@ -9,9 +9,11 @@ from pathlib import Path
 import attrs
 
 from deploy.launcher.process_table import BRIDGE, ProcessRow
+from deploy.net.authority import create, issue
 from shared.clock import NS_PER_S
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
+from shared.net.keyring import Keyring
 from shared.nodes import OBSERVER, all_nodes
 from shared.scenario import Net, Scenario
 from tests.chaos.lab import Lab
@@ -57,7 +59,7 @@ class ChaosFlight(Swarm):
         scenario: Name of the scenario.
         hand: URI of the hand.
         folder: Where logs go.
-        protocol: `tcp` or `udp` between the nodes.
+        protocol: `tcp`, `udp` or `quic` between the nodes; `quic` is the profile `field`, with keys.
         routed: Whether everybody is the client of a router.
         overrides: `key=value` items.
     """
@@ -78,6 +80,7 @@ class ChaosFlight(Swarm):
         self.lab = lab
         self.folder = folder
         self._protocol = protocol
+        self._keyring = Keyring(folder / "keys")
         self._routed = routed
         super().__init__(scenario, hand, folder, overrides)
         self.nodes = all_nodes(self.formation)
@@ -87,7 +90,12 @@ class ChaosFlight(Swarm):
     def place(self, raw: Scenario, formation: Formation) -> Scenario:
         """See `Swarm.place`: everybody in the mesh, vehicles in the air."""
         nodes = all_nodes(formation)
+        keys = self._protocol == "quic"
+        if keys:
+            self._issue_keys(raw.swarm.name, nodes)
         net = Net(
+            profile="field" if keys else "laptop",
+            keys=str(self._keyring.folder) if keys else "",
             endpoints={node: self._endpoint(self.lab.mesh(node)) for node in nodes},
             router=self._endpoint(self.lab.mesh(ROUTER)) if self._routed else None,
         )
@@ -140,8 +148,14 @@ class ChaosFlight(Swarm):
         self.recorder.until(lambda: members <= self.recorder.present, START_S)
         self.start("relay/0")
 
+    def _issue_keys(self, swarm: str, nodes: Sequence[str]) -> None:
+        create(self._keyring, swarm)
+        for node in nodes:
+            issue(self._keyring, node, (self.lab.mesh(node), self.lab.air(node)))
+
     def _endpoint(self, address: str) -> str:
-        return f"{self._protocol}/{address}:{PORT}"
+        # Best effort as datagrams, what is reliable as streams.
+        return f"{self._protocol}/{address}:{PORT}{'?mixed_rel=1' if self._protocol == 'quic' else ''}"
 
 
 @contextmanager

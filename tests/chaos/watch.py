@@ -14,8 +14,8 @@ from shared.topics import HAND
 from tests.chaos.flight import ChaosFlight
 from tests.integration.recorder import WORLD
 
-ALARMS = ~(Flag.AVOIDING | Flag.FENCE)
-"""Flags that say that something is wrong."""
+ALARMS = ~(Flag.AVOIDING | Flag.FENCE | Flag.EXTRAPOLATING)
+"""Flags that say that something is wrong, and not just late."""
 
 
 @frozen
