@@ -9,7 +9,7 @@ BIN := .venv/bin
 RUNTIME := .venv/.runtime
 DEVELOPMENT := .venv/.development
 
-.PHONY: help demo env test check lint chaos clean
+.PHONY: help demo env test check lint chip chaos clean
 
 help:  ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
@@ -33,11 +33,17 @@ lint: $(DEVELOPMENT)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# Debian: gcc libc6-dev gcc-avr avr-libc arduino-core-avr libsimavr-dev libelf-dev clang libclang-rt-14-dev
+chip:  ## the glove's firmware, its fuzzer, and a simulated chip that runs it; then pytest tests/chip
+	$(MAKE) -C glove_bridge/firmware BUILD=$(CURDIR)/build/firmware
+	$(MAKE) -C tests/chip/harness BUILD=$(CURDIR)/build/chip
+	$(MAKE) -C tests/chip/fuzz BUILD=$(CURDIR)/build/fuzz
+
 chaos: $(DEVELOPMENT)  ## as root: kill, freeze, part and flood a swarm in network namespaces; one table
 	$(BIN)/python -m tests.chaos --csv runs/chaos.csv
 
 clean:  ## remove what was set up and cached; flights in runs/ stay
-	rm -rf .bootstrap .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .bootstrap .venv build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # --inexact: flying never removes the tools of an environment for development.

@@ -15,25 +15,37 @@ class GloveLog:
     Attributes:
         latest: The last event of a pattern that reached the glove, None before the first.
         played: Patterns that have ended, by name.
+        delivered: Patterns that have started: a device has acknowledged them, by name.
         suppressed: Patterns that were wished for while the glove was busy, by name.
         failed: Patterns that did not start or were cut short, by name.
-        latency_ms: From the arrival of the newest drone state that brought a pattern about to its first frame.
+        lost: Those of them that did not start, by name.
+        latency_ms: From the arrival of the newest drone state that brought a pattern about to its first frame,
+            which a device tells by its acknowledgement.
     """
 
     def __init__(self) -> None:
         self.latest: PatternEvent | None = None
         self.played: Counter[str] = Counter()
+        self.delivered: Counter[str] = Counter()
         self.suppressed: Counter[str] = Counter()
         self.failed: Counter[str] = Counter()
+        self.lost: Counter[str] = Counter()
         self.latency_ms = Histogram()
 
     def add(self, event: PatternEvent) -> None:
         """Takes the next event."""
-        counts = {"finished": self.played, "suppressed": self.suppressed, "failed": self.failed}
+        counts = {
+            "started": self.delivered,
+            "finished": self.played,
+            "suppressed": self.suppressed,
+            "failed": self.failed,
+        }
         if event.outcome in counts:
             counts[event.outcome][event.pattern] += 1
         if event.outcome == "started":
             self._add_latency(event)
+        if event.outcome == "failed" and event.started_ns == 0:
+            self.lost[event.pattern] += 1
         if event.outcome != "suppressed":
             self.latest = event
 

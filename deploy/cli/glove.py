@@ -1,50 +1,86 @@
-"""`swarmtouch glove`: the tactile patterns, shown, played, compared and drawn."""
+"""`swarmtouch glove`: tactile patterns to look at, and the tools for a glove on a serial line."""
 
 import argparse
+import importlib
 from pathlib import Path
 
-from shared.errors import ConfigError
+from deploy.cli.arguments import seconds
 
-DESCRIPTION = """glove patterns       lists the pattern sets
-glove patterns SET   shows a set: its frames, and how well people would tell its patterns apart. The latter is
-                     the prediction of a fitted model of perception, not a measurement."""
+DESCRIPTION = """Looks at tactile patterns, and sets up a glove. A glove is named as for `swarmtouch up`:
+serial:///dev/ttyACM0, with ?link=xbee by radio, with ?calibration=FILE as calibrated; without --glove it is
+the only USB serial port there is. docs/glove.md goes from the parts to the first vibration."""
 EXAMPLE = """swarmtouch glove patterns distinct --compare paper
-         swarmtouch glove patterns flight --play
-         swarmtouch glove patterns paper --svg paper.svg"""
+         swarmtouch glove buzz 3 200 500
+         swarmtouch glove play EI --glove serial:///dev/ttyACM0?calibration=mine.toml"""
+
+ACTIONS = {
+    "patterns": ("list the pattern sets, or show, play, compare and draw one", "paper --compare distinct"),
+    "ports": ("list the serial ports of this machine", ""),
+    "hello": ("ask the device what it is, and how fast it answers", "--glove serial:///dev/ttyACM0"),
+    "buzz": ("vibrate one finger", "3 200 500"),
+    "play": ("play one pattern, or all of a set", "all --patterns flight"),
+    "calibrate": ("find out what each motor needs, and write it to a file", "--output mine.toml"),
+    "flash": ("put the firmware on an Arduino UNO", "--port /dev/ttyACM0"),
+}
+"""Action -> one line, and an example; the module `deploy.glove.<action>` does it."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declares the arguments."""
-    parser.add_argument("action", choices=["patterns"], help="what to look at")
+    """Declares the actions, each with its own arguments."""
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    children = {
+        name: actions.add_parser(
+            name,
+            help=summary,
+            description=f"{summary.capitalize()}.",
+            epilog=f"example: swarmtouch glove {name} {example}",
+        )
+        for name, (summary, example) in ACTIONS.items()
+    }
+    _add_patterns(children["patterns"])
+    for name in ("hello", "buzz", "play", "calibrate"):
+        children[name].add_argument("--glove", metavar="URI", help="the glove (default: the only USB port)")
+    buzz, play, calibrate, flash = (children[name] for name in ("buzz", "play", "calibrate", "flash"))
+    buzz.add_argument("finger", type=int, choices=range(1, 6), metavar="FINGER", help="1 (thumb) to 5")
+    buzz.add_argument("hz", type=_frequency, metavar="HZ", help="frequency, 50 to 300 Hz")
+    buzz.add_argument("ms", type=_length, metavar="MS", help="length, 20 to 2000 ms")
+    play.add_argument("name", metavar="NAME", help="a pattern, for example EI; `all` for the whole set")
+    play.add_argument("--patterns", default="paper", metavar="SET", help="its set (default: %(default)s)")
+    calibrate.add_argument(
+        "--output", type=Path, default=Path("glove.toml"), metavar="FILE", help="default: %(default)s"
+    )
+    calibrate.add_argument(
+        "--turn", type=seconds, default=1.0, metavar="S", help="length of a trial, s (default: %(default)s)"
+    )
+    flash.add_argument("--port", metavar="DEVICE", help="default: the only USB port")
+    flash.add_argument("--hex", type=Path, metavar="FILE", help="default: the firmware that ships")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Does what was asked for and returns the exit code."""
+    # --help must not load numpy, rich and the serial port.
+    action = importlib.import_module(f"deploy.glove.{arguments.action}")
+    code: int = action.run(arguments)
+    return code
+
+
+def _add_patterns(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("set", nargs="?", metavar="SET", help="name of a set that ships, or a TOML file")
     parser.add_argument("--compare", metavar="SET", help="show the prediction of another set beside")
     parser.add_argument("--play", action="store_true", help="play every pattern on the terminal")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="draw the set as an SVG picture")
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Shows what was asked for and returns the exit code."""
-    from deploy.glove.play import play_set  # noqa: PLC0415  --help must not load numpy and rich
-    from deploy.glove.show import list_sets, show_set  # noqa: PLC0415
-    from deploy.glove.svg import draw_svg  # noqa: PLC0415
-    from glove_bridge.patterns import load_patterns  # noqa: PLC0415
-
-    if arguments.set is None:
-        if arguments.compare or arguments.play or arguments.svg:
-            raise ConfigError("glove patterns: which set? For example: swarmtouch glove patterns paper --play")
-        list_sets()
-        return 0
-    patterns = load_patterns(arguments.set)
-    show_set(patterns, load_patterns(arguments.compare) if arguments.compare else None)
-    if arguments.svg:
-        _write(arguments.svg, draw_svg(patterns))
-    if arguments.play:
-        play_set(patterns)
-    return 0
+def _frequency(text: str) -> float:
+    return _within(text, 50.0, 300.0)
 
 
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"--svg {path}: cannot be written: {error}") from error
+def _length(text: str) -> int:
+    return int(_within(text, 20.0, 2000.0))
+
+
+def _within(text: str, low: float, high: float) -> float:
+    value = float(text)
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(f"{text} must be {low:g} to {high:g}")
+    return value

@@ -21,7 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the arguments."""
     add_flight_arguments(parser, hand="scripted:tour")
     parser.add_argument(
-        "--glove", metavar="URI", help="make the swarm felt: terminal:// or record://FILE (default: no glove)"
+        "--glove",
+        metavar="URI",
+        help="make the swarm felt: serial://DEVICE, terminal:// or record://FILE (default: no glove)",
     )
     parser.add_argument(
         "--patterns",

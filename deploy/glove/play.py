@@ -1,22 +1,35 @@
-"""Plays a pattern set on the terminal, one pattern after the other."""
+"""`swarmtouch glove play`: plays a pattern, or a whole set, on a glove."""
 
+import argparse
 import time
 
-from glove_bridge.gloves.terminal import TerminalGlove
-from glove_bridge.patterns.pattern import PatternSet
-from shared.clock import NS_PER_S, system_clock
+from deploy.glove.device import worn
+from deploy.glove.player import play, tell
+from glove_bridge.patterns import load_patterns
+from shared.clock import system_clock
+from shared.errors import ConfigError
+
+ALL = "all"
 
 
-def play_set(patterns: PatternSet) -> None:
-    """Plays every pattern at its own pace, with the rest between two that its gate asks for."""
-    glove, clock = TerminalGlove(), system_clock()
-    try:
-        for pattern in patterns.patterns.values():
-            start_ns = clock()
-            glove.play(pattern, start_ns)
-            while (next_ns := glove.next_ns()) is not None:
-                time.sleep(max(0.0, (next_ns - clock()) / NS_PER_S))
-                glove.poll(clock())
-            time.sleep(max(0.0, pattern.gate_ms / 1000.0 - (clock() - start_ns) / NS_PER_S))
-    finally:
-        glove.close()
+def run(arguments: argparse.Namespace) -> int:
+    """Plays it and returns whether everything was felt.
+
+    Raises:
+        ConfigError: No such set or pattern, or a URI that is refused.
+        DeviceError: The glove does not answer.
+    """
+    patterns = load_patterns(arguments.patterns)
+    if arguments.name not in (ALL, *patterns.patterns):
+        known = ", ".join(patterns.patterns)
+        raise ConfigError(
+            f"{arguments.name}: no such pattern in set {patterns.name!r}; it has {known}; or {ALL}"
+        )
+    chosen = [p for name, p in patterns.patterns.items() if arguments.name in (ALL, name)]
+    clock, code = system_clock(), 0
+    with worn(arguments.glove) as glove:
+        for k, pattern in enumerate(chosen):
+            if k:
+                time.sleep((pattern.gate_ms - pattern.length_ms) / 1000.0)
+            code |= tell(pattern, play(glove, pattern, clock))
+    return code

@@ -16,7 +16,7 @@ from observer.glove_log import GloveLog
 
 Json = dict[str, Any]
 
-_OUTCOMES = ("played", "suppressed", "failed")
+_OUTCOMES = ("played", "delivered", "suppressed", "failed", "lost")
 
 
 def flight_summary(outcome: Outcome, monitor: Monitor, glove: GloveChoice | None = None) -> Json:
@@ -32,9 +32,9 @@ def flight_summary(outcome: Outcome, monitor: Monitor, glove: GloveChoice | None
         exit), `seconds`, `restarts`, the referee's `min_distance_m`, `min_hand_distance_m`, `collisions`,
         `fence_exits` (null without a simulated world), `agents` with `id, steps, rate_hz, on_time, hand_used,
         tracking_rms_m, latency_ms {p50, p99}, cpu, rss_mb` each; and beyond the contract `landed`,
-        `formation`, `glove` (null without one: `uri`, `patterns`, `played`, `suppressed` and `failed` by
-        pattern, `latency_ms` from the drone state to the first frame) and, per agent, `lateness_ms`,
-        `missed` and `restarts`.
+        `formation`, `glove` (null without one: `uri`, `patterns`; `played`, `delivered`, `suppressed`, `failed`
+        and `lost` by pattern; `latency_ms` from the drone state to the first frame) and, per agent,
+        `lateness_ms`, `missed` and `restarts`.
     """
     referee = outcome.referee
     formation = attrs.asdict(monitor.stats.formation())
@@ -95,9 +95,7 @@ def _glove(choice: GloveChoice, log: GloveLog) -> Json:
     return {
         "uri": choice.uri,
         "patterns": choice.patterns,
-        "played": dict(log.played),
-        "suppressed": dict(log.suppressed),
-        "failed": dict(log.failed),
+        **{outcome: dict(getattr(log, outcome)) for outcome in _OUTCOMES},
         "latency_ms": log.latency_ms.quantiles()._asdict(),
     }
 

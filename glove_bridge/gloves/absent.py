@@ -2,6 +2,7 @@
 
 from glove_bridge.gloves.base import Outcome, Report
 from glove_bridge.patterns.pattern import Pattern
+from shared.uri import Uri
 
 
 class AbsentGlove:
@@ -9,8 +10,9 @@ class AbsentGlove:
 
     connected = False
 
-    def __init__(self, _: str = "") -> None:
-        """Takes the part of the URI after the scheme; there is nothing to choose."""
+    def __init__(self, uri: Uri) -> None:
+        """Takes a URI without options."""
+        uri.refuse_unknown()
         self._reports: list[Report] = []
 
     def play(self, pattern: Pattern, now_ns: int) -> None:  # noqa: ARG002  interface

@@ -12,6 +12,7 @@ from glove_bridge.gloves.timed import TimedGlove
 from glove_bridge.patterns.pattern import Frame, Pattern
 from glove_bridge.patterns.schema import FINGERS
 from shared.errors import ConfigError
+from shared.uri import Uri
 
 _log = logging.getLogger("glove")
 
@@ -20,14 +21,16 @@ class RecordGlove(TimedGlove):
     """Appends to a file.
 
     Args:
-        path: The part of the URI after the scheme.
+        uri: Its path is the file.
 
     Raises:
-        ConfigError: No path, or the file cannot be written.
+        ConfigError: No path, an option, or the file cannot be written.
     """
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, uri: Uri) -> None:
         super().__init__()
+        uri.refuse_unknown()
+        path = uri.path
         if not path:
             raise ConfigError("record://: no file; for example record://patterns.jsonl")
         try:

@@ -7,6 +7,7 @@ from typing import TextIO
 from glove_bridge.gloves.timed import TimedGlove
 from glove_bridge.patterns.pattern import Frame, Pattern
 from glove_bridge.patterns.schema import FINGERS
+from shared.uri import Uri
 
 _REST = "·"
 _LEVELS = ((175.0, "░"), (225.0, "▒"), (float("inf"), "█"))
@@ -19,12 +20,14 @@ class TerminalGlove(TimedGlove):
     """Draws on a stream.
 
     Args:
-        _: The part of the URI after the scheme; there is nothing to choose.
+        uri: There is nothing to choose in it.
         stream: Where to draw; standard output by default.
     """
 
-    def __init__(self, _: str = "", stream: TextIO | None = None) -> None:
+    def __init__(self, uri: Uri | None = None, stream: TextIO | None = None) -> None:
         super().__init__()
+        if uri is not None:
+            uri.refuse_unknown()
         self._stream: TextIO | None = stream or sys.stdout
         self._in_place = self._stream.isatty()
 

@@ -3,13 +3,15 @@
 import importlib
 from typing import cast
 
-from human_relay.sources.base import HandBackend, HandSource, SourceUri, parse_uri
+from human_relay.sources.base import HandBackend, HandSource, SourceUri
 from shared.errors import ConfigError
+from shared.uri import parse_uri
 
 BACKENDS = {
     "scripted": ("human_relay.sources.scripted", "ScriptedHand"),
     "recording": ("human_relay.sources.recording", "RecordedHand"),
 }
+_EXAMPLE = "scripted:tour?peak=0.4"
 
 
 def open_source(uri: str, start_ns: int) -> HandSource:
@@ -22,7 +24,7 @@ def open_source(uri: str, start_ns: int) -> HandSource:
     Raises:
         ConfigError: Unknown scheme or option, or a file that is missing or wrong.
     """
-    parsed = parse_uri(uri)
+    parsed = parse_uri(uri, example=_EXAMPLE)
     return _backend(parsed)(parsed, start_ns)
 
 
@@ -38,7 +40,7 @@ def source_hints(uri: str) -> dict[str, object]:
     Raises:
         ConfigError: As for `open_source`.
     """
-    parsed = parse_uri(uri)
+    parsed = parse_uri(uri, example=_EXAMPLE)
     return _backend(parsed).hints(parsed)
 
 

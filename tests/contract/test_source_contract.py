@@ -219,7 +219,7 @@ def test_yaw_is_relative_and_does_not_jump_at_half_a_turn() -> None:
         ("scripted:tour?peak=fast", "peak=fast must be a number from 0.01 to 2"),
         ("scripted:tour?peak=9", "peak=9 must be a number"),
         ("scripted:tour?peak=nan", "peak=nan must be a number"),
-        ("scripted:tour?peak", "not a source URI"),
+        ("scripted:tour?peak", "not a URI"),
         ("recording:", "no path"),
         ("recording:/nowhere/hand.csv", "/nowhere/hand.csv: no such recording; expected a flight folder"),
     ],

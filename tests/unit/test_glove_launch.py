@@ -71,7 +71,9 @@ def test_the_log_counts_outcomes_and_measures_the_newest_drone_state() -> None:
     log.add(event("CR", "finished", START))
     log.add(event("CL", "suppressed"))
     log.add(event("ER", "failed"))
-    assert (dict(log.played), dict(log.suppressed), dict(log.failed)) == ({"CR": 1}, {"CL": 1}, {"ER": 1})
+    log.add(event("ER", "failed", START))
+    assert (log.delivered, log.played, log.suppressed) == ({"CR": 1}, {"CR": 1}, {"CL": 1})
+    assert (log.failed, log.lost) == ({"ER": 2}, {"ER": 1})
     assert log.latency_ms.quantile(0.5) == pytest.approx(7.0, rel=0.02)
     assert log.latest is not None
     assert log.latest.pattern == "ER"
@@ -146,13 +148,16 @@ def test_the_summary_table_lists_patterns() -> None:
         "uri": "terminal://",
         "patterns": "flight",
         "played": {"CR": 3},
+        "delivered": {"CR": 3},
         "suppressed": {"CL": 1},
-        "failed": {},
+        "failed": {"EL": 2},
+        "lost": {"EL": 1},
         "latency_ms": {"p50": 2.5, "p99": None},
     }
     console = Console(width=100, file=io.StringIO())
     with console.capture() as captured:
         console.print(_glove_table(glove))
     rows = [line.split() for line in captured.get().splitlines()]
-    assert ["CR", "3", "0", "0"] in rows
-    assert ["CL", "0", "1", "0"] in rows
+    assert ["CR", "3", "3", "0", "0", "0"] in rows
+    assert ["EL", "0", "0", "0", "2", "1"] in rows
+    assert ["CL", "0", "0", "1", "0", "0"] in rows

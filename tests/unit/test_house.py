@@ -19,7 +19,10 @@ PURE = [
     *(ROOT / f"human_relay/{name}.py" for name in ("velocity", "relay")),
     *(
         ROOT / f"glove_bridge/{name}.py"
-        for name in ("formation_state", "meaning", "cues", "scheduler", "swarm_view", "distinctiveness")
+        for name in (
+            *("formation_state", "meaning", "cues", "scheduler", "swarm_view", "distinctiveness"),
+            *("protocol", "framing", "session", "calibration"),
+        )
     ),
     *sorted((ROOT / "glove_bridge/rules").glob("*.py")),
     *(ROOT / f"glove_bridge/patterns/{name}.py" for name in ("pattern", "schema")),
@@ -36,6 +39,7 @@ PURE = [
             "scenario",
             "shapes",
             "topics",
+            "uri",
         )
     ),
 ]

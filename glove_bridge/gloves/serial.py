@@ -1,0 +1,117 @@
+"""`serial://DEVICE?baud=115200&link=usb&calibration=FILE`: a glove on a serial line, directly or by radio.
+
+`link=xbee` is a pair of XBee radios in transparent mode: 57600 baud, a longer dead-man, more patience.
+"""
+
+import time
+
+import attrs
+
+from glove_bridge.calibration import device_frames
+from glove_bridge.calibration_file import load_calibration
+from glove_bridge.gloves.base import Outcome, Report
+from glove_bridge.gloves.serial_link import SerialLink
+from glove_bridge.patterns.pattern import Pattern
+from glove_bridge.session import USB, XBEE, LinkTiming, Session
+from shared.errors import ConfigError
+from shared.uri import Uri
+
+_RATES = (9600, 19200, 38400, 57600, 115200)
+_LINKS = {"usb": USB, "xbee": XBEE}
+_POLL_NS = 2_000_000
+"""How soon to poll again while the device has something to say."""
+
+
+class SerialGlove:
+    """A glove that times its patterns itself; see `Glove`.
+
+    A pattern has started when the device has acknowledged it, and ended when the device says so. It fails if it
+    is not acknowledged after two repetitions, if something else is asked for, or if the line dies.
+
+    Args:
+        uri: The device as its path; see above.
+
+    Raises:
+        ConfigError: No device, a wrong option, or a calibration that is refused. A device that is not there is
+            waited for.
+    """
+
+    def __init__(self, uri: Uri) -> None:
+        uri.refuse_unknown("baud", "link", "calibration")
+        if not uri.path:
+            raise ConfigError(f"{uri.text}: no device; for example serial:///dev/ttyACM0")
+        self._calibration = load_calibration(uri.options.get("calibration"))
+        self.link = SerialLink(uri.path, link_timing(uri))
+        self._awaited = 0
+        self._closed = False
+        self._reports: list[Report] = []
+        self._offset_ns: int | None = None
+        self._polled_ns = 0
+
+    @property
+    def connected(self) -> bool:
+        """See `Glove.connected`."""
+        return not self._closed and self.link.connected
+
+    def play(self, pattern: Pattern, now_ns: int) -> None:
+        """See `Glove.play`."""
+        self._note(now_ns)
+        if self._closed:
+            self._reports.append(Report(Outcome.FAILED, now_ns))
+            return
+        frames = device_frames(pattern, self._calibration)
+        self._awaited += 1
+        self.link.order(lambda session, at_ns: session.play(frames, at_ns))
+
+    def poll(self, now_ns: int) -> list[Report]:
+        """See `Glove.poll`."""
+        offset = self._note(now_ns)
+        for report in self.link.reports():
+            if report.outcome is not Outcome.STARTED:
+                self._awaited -= 1
+            self._reports.append(Report(report.outcome, report.at_ns + offset))
+        reports, self._reports = self._reports, []
+        return reports
+
+    def next_ns(self) -> int | None:
+        """See `Glove.next_ns`."""
+        return self._polled_ns + _POLL_NS if self._awaited else None
+
+    def stop(self, now_ns: int) -> None:
+        """See `Glove.stop`."""
+        self._note(now_ns)
+        if self._awaited and not self._closed:
+            self.link.order(Session.stop)
+
+    def close(self) -> None:
+        """See `Glove.close`."""
+        if not self._closed:
+            self._closed = True
+            self.link.close()
+
+    def _note(self, now_ns: int) -> int:
+        """Learns how far the caller's clock is ahead of the line's.
+
+        A caller looks at its clock before it calls, never after: the largest offset is the nearest.
+        """
+        offset = now_ns - time.monotonic_ns()
+        self._offset_ns = offset if self._offset_ns is None else max(self._offset_ns, offset)
+        self._polled_ns = now_ns
+        return self._offset_ns
+
+
+def link_timing(uri: Uri) -> LinkTiming:
+    """Reads the options `link` and `baud`.
+
+    Raises:
+        ConfigError: Another link than `usb` or `xbee`, or a rate that not every port has.
+    """
+    name = uri.options.get("link", "usb")
+    if name not in _LINKS:
+        raise ConfigError(f"{uri.text}: link={name}; known ones: {', '.join(_LINKS)}")
+    timing = _LINKS[name]
+    rates = {str(rate): rate for rate in _RATES}
+    baud = uri.options.get("baud", str(timing.baud))
+    if baud not in rates:
+        raise ConfigError(f"{uri.text}: baud={baud}; known ones: {', '.join(rates)}")
+    return attrs.evolve(timing, baud=rates[baud])
