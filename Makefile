@@ -9,7 +9,7 @@ BIN := .venv/bin
 RUNTIME := .venv/.runtime
 DEVELOPMENT := .venv/.development
 
-.PHONY: help demo env test check lint chip clean
+.PHONY: help demo env test check lint chip chaos clean
 
 help:  ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
@@ -38,6 +38,9 @@ chip:  ## the glove's firmware, its fuzzer, and a simulated chip that runs it; t
 	$(MAKE) -C glove_bridge/firmware BUILD=$(CURDIR)/build/firmware
 	$(MAKE) -C tests/chip/harness BUILD=$(CURDIR)/build/chip
 	$(MAKE) -C tests/chip/fuzz BUILD=$(CURDIR)/build/fuzz
+
+chaos: $(DEVELOPMENT)  ## as root: kill, freeze, part and flood a swarm in network namespaces; one table
+	$(BIN)/python -m tests.chaos --csv runs/chaos.csv
 
 clean:  ## remove what was set up and cached; flights in runs/ stay
 	rm -rf .bootstrap .venv build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

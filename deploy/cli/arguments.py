@@ -1,6 +1,9 @@
 """Arguments that several commands take."""
 
 import argparse
+import os
+
+from shared.process import OVERRIDES
 
 
 def add_flight_arguments(parser: argparse.ArgumentParser, *, hand: str) -> None:
@@ -36,7 +39,7 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
         "--set",
         dest="overrides",
         action="append",
-        default=[],
+        default=os.environ.get(OVERRIDES, "").split(),
         metavar="KEY=VALUE",
         help="override a key of the scenario, for example formation.n=8; repeatable",
     )

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.container.engine import NoEngineError, base_image, docker, engine
+from tests.container.engine import NoEngineError, base_image, docker, engine, succeeds
 from tests.container.project import IMAGE, ROOT
 
 
@@ -13,7 +13,10 @@ def base() -> Iterator[str]:
     """Name of the base image, on an engine that runs."""
     try:
         with engine():
-            yield base_image()
+            name = base_image()
+            if not succeeds("docker", "run", "--rm", name, "true"):
+                raise NoEngineError("the engine answers, but cannot run a container here")
+            yield name
     except NoEngineError as reason:
         pytest.skip(str(reason))
 

@@ -95,7 +95,10 @@ def base_image() -> str:
             f"{OFFICIAL_BASE} cannot be pulled, and only root with debootstrap can make a base image"
         )
     with tempfile.TemporaryDirectory() as folder:
-        run("debootstrap", "--variant=minbase", f"--include={PACKAGES}", "bookworm", folder, timeout=600.0)
+        if not succeeds("debootstrap", "--variant=minbase", f"--include={PACKAGES}", "bookworm", folder):
+            raise NoEngineError(
+                f"{OFFICIAL_BASE} cannot be pulled, nor a base image made from Debian's packages"
+            )
         _import(Path(folder))
     return LOCAL_BASE
 

@@ -18,7 +18,9 @@ from tests.integration.recorder import START_S, WORLD, Recorder
 
 pytestmark = [pytest.mark.container, pytest.mark.timeout(900)]
 
+SERVICES = ("world", "relay", *(f"drone-{i}" for i in (1, 2, 3, 4)), "bridge", "observer", "console")
 HEAL_S = 20.0
+HEALTHY_S = 60.0
 LARGEST_MB = 250.0
 """What our layers may add to the base image."""
 
@@ -36,7 +38,7 @@ def test_both_versions_of_compose_read_the_files(command: tuple[str, ...], files
         pytest.skip(f"{' '.join(command)} is not installed")
     arguments = [argument for file in files for argument in ("--file", file)]
     services = run(*command, *arguments, "config", "--services").split()
-    assert {"world", "relay", "drone-1", "drone-4", "bridge"} <= set(services)
+    assert {*SERVICES} <= set(services)
     assert ("router" in services) == (ROUTER_FILE in files)
 
 
@@ -68,12 +70,16 @@ def test_the_demo_flies_loses_a_container_heals_and_leaves_nothing() -> None:
             recorder.until(healed, HEAL_S)
             for drone in (1, 3, 4):
                 assert len({state.epoch for state in recorder.since(drone, killed_ns)}) == 1
-            recorder.listen(1.5)
+            recorder.until(lambda: health_of_all(project) == {"healthy"}, HEALTHY_S)
             assert recorder.statuses[WORLD].metrics["collisions"] == 0.0
             assert recorder.statuses[WORLD].metrics["fence_exits"] == 0.0
         assert project.inspect("drone-2", "{{.RestartCount}}") == "1"
         assert "Traceback" not in project.logs()
     assert project.leftovers() == ""
+
+
+def health_of_all(project: Project) -> set[str]:
+    return {project.inspect(service, "{{.State.Health.Status}}") for service in SERVICES}
 
 
 def check_that_the_hand_is_apart(project: Project) -> None:

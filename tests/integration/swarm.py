@@ -16,7 +16,7 @@ from attrs import frozen
 from deploy.launcher.ports import free_ports
 from deploy.launcher.process_table import ProcessRow, process_table, resolve_scenario
 from shared.config import dump_scenario, load_scenario
-from shared.formation import build_formation
+from shared.formation import Formation, build_formation
 from shared.messages import Mode
 from shared.nodes import all_nodes
 from shared.process import LAUNCHER_PID
@@ -37,8 +37,7 @@ class Swarm:
     def __init__(self, name: str, hand: str, folder: Path, overrides: Sequence[str] = ()) -> None:
         raw = load_scenario(name, overrides)
         self.formation = formation = build_formation(raw)
-        tcp, (udp,) = free_ports(tcp=len(all_nodes(formation)), udp=1)
-        self.scenario = resolve_scenario(raw, formation, tcp, udp)
+        self.scenario = self.place(raw, formation)
         self.ids = formation.ids
         self._folder = folder
         file = folder / "scenario.toml"
@@ -46,7 +45,20 @@ class Swarm:
         rows = process_table(self.scenario, formation, file=file, hand=hand, run_dir=folder)
         self._rows: dict[str, ProcessRow] = {row.token: row for row in rows}
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
-        self.recorder = Recorder(self.scenario)
+        self.recorder = self.open_recorder()
+
+    def place(self, raw: Scenario, formation: Formation) -> Scenario:
+        """Returns the scenario with an address for everybody; here free ports on loopback."""
+        tcp, (udp,) = free_ports(tcp=len(all_nodes(formation)), udp=1)
+        return resolve_scenario(raw, formation, tcp, udp)
+
+    def open_recorder(self) -> Recorder:
+        """Opens a recorder that reaches everybody."""
+        return Recorder(self.scenario)
+
+    def command(self, row: ProcessRow) -> tuple[str, ...]:
+        """Returns the command line of a process."""
+        return row.command
 
     def start_all(self) -> None:
         """Starts the world and the agents, and the relay when everybody listens."""
@@ -62,7 +74,11 @@ class Swarm:
         environment = {LAUNCHER_PID: str(os.getpid()), "OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
         with (self._folder / f"{row.name}.log").open("ab") as log:
             self.processes[token] = subprocess.Popen(
-                row.command, stdin=subprocess.PIPE, stdout=log, stderr=log, env={**os.environ, **environment}
+                self.command(row),
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                env={**os.environ, **environment},
             )
 
     def kill(self, token: str) -> int:

@@ -1,0 +1,160 @@
+"""Kill -9: agents, those who only watch, the relay, the router."""
+
+from pathlib import Path
+
+from shared.messages import Flag, Mode
+from shared.nodes import OBSERVER
+from tests.chaos.flight import ROUTER, ChaosFlight, chaos_flight
+from tests.chaos.row import Row, judge
+from tests.chaos.steps import (
+    CUE_S,
+    REJOIN_S,
+    Fly,
+    all_follow,
+    exists,
+    only,
+    settle,
+    wait,
+    watch_from_now,
+    within,
+)
+
+REST = "scripted:hold"
+SURVIVORS_S = 5.0
+"""The survivors stand in the repaired geometry so soon."""
+RESTART_S = 0.25
+"""A supervisor's pause before it starts a process again."""
+
+
+def kill_drones(*victims: int) -> Fly:
+    """Kills agents for good, the hand at rest; the others stand where repair puts them; then they come back."""
+
+    def fly(folder: Path) -> Row:
+        with chaos_flight(folder, REST) as flight:
+            recorder = flight.recorder
+            watch = watch_from_now(flight, victims)
+            for victim in victims:
+                flight.kill(f"drone/{victim}")
+            shaped = settle(watch, SURVIVORS_S)
+            modes = {mode for drone in watch.drones for mode in watch.modes(drone)}
+            orphans = [i for i in watch.drones if set(flight.formation.references(i)) & set(victims)]
+            repaired = [i for i in orphans if Flag.REPAIRED in recorder.latest(i).flags]
+            for victim in victims:
+                flight.start(f"drone/{victim}")
+            back = wait(flight, lambda: all_follow(flight, victims), REJOIN_S)
+            recorder.listen(1.5)
+            return judge(
+                f"kill -9 drone {' and '.join(map(str, victims))}",
+                watch,
+                gone=f"drone/{victims[0]}",
+                recovered_s=back,
+                demands=[
+                    (within(watch.cue(f"drone/{victims[0]}"), CUE_S), "cue by token within 50 ms"),
+                    (shaped is not None, "survivors within 10 % of the repaired geometry in 5 s"),
+                    (repaired == orphans, f"repaired: {orphans}, not only {repaired}"),
+                    (modes <= {Mode.FOLLOW, Mode.HOLD}, "survivors fly on"),
+                ],
+                notes=[f"survivors in shape after {shaped:.2f} s"] if shaped is not None else [],
+            )
+
+    return fly
+
+
+def restart_drone(folder: Path) -> Row:
+    """Kills an agent that a supervisor brings back while its body is still in the air."""
+    with chaos_flight(folder) as flight:
+        watch = watch_from_now(flight, (2,))
+        flight.kill("drone/2")
+        flight.recorder.listen(RESTART_S)
+        flight.start("drone/2")
+        back = wait(flight, lambda: all_follow(flight, (2,)), REJOIN_S)
+        heights = [s.position[2] for s in flight.recorder.states[2] if s.epoch > watch.start_ns]
+        flight.recorder.listen(1.5)
+        return judge(
+            "kill -9 drone 2, restarted",
+            watch,
+            gone="drone/2",
+            recovered_s=back,
+            demands=[
+                (within(watch.cue("drone/2"), CUE_S), "cue by token within 50 ms"),
+                (min(heights, default=0.0) > 0.5, "it is back before its body falls"),
+            ],
+        )
+
+
+def kill_bystander(role: str) -> Fly:
+    """Kills a process on which nothing in flight depends, and brings it back."""
+
+    def fly(folder: Path) -> Row:
+        with chaos_flight(folder, before=add_bystanders) as flight:
+            watch = watch_from_now(flight)
+            flight.kill(f"{role}/0")
+            flight.recorder.listen(2.0)
+            flight.start(f"{role}/0")
+            back = wait(flight, lambda: f"{role}/0" in flight.recorder.present, REJOIN_S)
+            flight.recorder.listen(1.5)
+            return judge(
+                f"kill -9 {role}",
+                watch,
+                gone=f"{role}/0",
+                recovered_s=back,
+                demands=[
+                    (within(watch.cue(f"{role}/0"), CUE_S), "cue by token within 50 ms"),
+                    (only(watch, Mode.FOLLOW), "nobody even holds"),
+                ],
+            )
+
+    return fly
+
+
+def kill_relay(folder: Path) -> Row:
+    """Kills the relay for 3 s."""
+    with chaos_flight(folder) as flight:
+        watch = watch_from_now(flight)
+        flight.kill("relay/0")
+        flight.recorder.listen(3.0)
+        held = all(flight.recorder.latest(drone).mode is Mode.HOLD for drone in watch.drones)
+        drift = watch.drift(watch.drones, (1.5, 3.0))
+        flight.start("relay/0")
+        back = wait(flight, lambda: all_follow(flight), REJOIN_S)
+        flight.recorder.listen(1.5)
+        return judge(
+            "kill -9 relay for 3 s",
+            watch,
+            gone="relay/0",
+            recovered_s=back,
+            demands=[
+                (within(watch.cue("relay/0"), CUE_S), "cue by token within 50 ms"),
+                (within(watch.alarm(Flag.HAND_STALE), 0.4), "the hand counts as silent after 0.25 s"),
+                (held, "HOLD after 1 s"),
+                (drift <= 0.3, "drift of at most 0.3 m"),
+            ],
+            notes=[f"drift {drift:.2f} m"],
+        )
+
+
+def kill_router(folder: Path) -> Row:
+    """Kills the router that everybody is a client of, for 1 s."""
+    with chaos_flight(folder, routed=True) as flight:
+        watch = watch_from_now(flight)
+        flight.kill(f"{ROUTER}/0")
+        flight.recorder.listen(1.0)
+        flight.start(f"{ROUTER}/0")
+        back = wait(flight, lambda: all_follow(flight), REJOIN_S)
+        flight.recorder.listen(1.5)
+        epochs = {state.epoch for drone in watch.drones for state in flight.recorder.states[drone]}
+        return judge(
+            "kill -9 router for 1 s",
+            watch,
+            recovered_s=back,
+            demands=[(len(epochs) == len(watch.drones), "every agent outlives it")],
+        )
+
+
+def add_bystanders(flight: ChaosFlight) -> None:
+    """Adds those who only watch, as far as they exist."""
+    scenario = ("--scenario", str(flight.folder / "scenario.toml"))
+    if exists("observer.__main__"):
+        flight.add(OBSERVER, "observer", *scenario, "--run-dir", str(flight.folder / "trace"))
+    if exists("observer.console.__main__"):
+        flight.add("console", "observer.console", *scenario, "--port", "0")
