@@ -71,7 +71,7 @@ class StandIn(NamedTuple):
 
     Attributes:
         share: 0: it speaks for itself; 1: its stand-in does.
-        heard_for: How long it has been fit to lead without a gap, s.
+        heard_for: How long it has been fit to lead again without a gap, s.
         links: Its links, simulated while the stand-in has a share.
     """
 
@@ -130,15 +130,18 @@ def _advance(
     stand_in: StandIn, kin: Kin, reference: Reference | None, hand_velocity: Vector, dt: float
 ) -> StandIn:
     share, heard_for, links = stand_in
+    gone = _is_gone(reference)
+    if share == 0.0 and not gone:
+        return stand_in
     heard_for = heard_for + dt if is_fit(reference) else 0.0
-    if _is_gone(reference):
-        # Nothing to blend from if it was never there.
-        share = 1.0 if reference is None else min(share + dt / BLEND, 1.0)
-    elif share > 0.0:
-        rising = heard_for < RETURN_AFTER
-        share = min(share + dt / BLEND, 1.0) if rising else max(share - dt / BLEND, 0.0)
-    if share == 0.0:
-        return StandIn(0.0, heard_for, (AT_REST,) * len(links))
+    if reference is None:
+        share = 1.0  # nothing to blend from: it was never there
+    elif gone or heard_for < RETURN_AFTER:
+        share = min(share + dt / BLEND, 1.0)
+    else:
+        share -= dt / BLEND
+    if share <= 0.0:
+        return nobody_gone((kin,))[0]
     return StandIn(share, heard_for, step_links(links, kin.row.links, hand_velocity, dt))
 
 
