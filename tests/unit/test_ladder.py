@@ -17,6 +17,8 @@ from tests.unit.test_step import REST, TICK, drones, hand, inputs, reference, se
 
 CALM_S, REST_S = 1.0, 12.0
 HAND_SPEED = 1.5
+CALM_STAMP = 100.0
+"""Later than any stamp of the stories, s."""
 BODY_SHARE = 0.3
 """How much of the way to its set-point the body covers in one step."""
 
@@ -95,7 +97,9 @@ def test_every_state_but_stop_is_left_once_all_is_well_and_the_operator_asks(
 ) -> None:
     life = lived(settings(4, f"swarm.law={law}"), story, airborne=airborne)
     life.live(inputs(4, wish=Wish.HOLD), CALM_S)
-    life.live(inputs(4), REST_S)
+    for k in range(round(REST_S / TICK)):
+        # A living hand: it is chased by its own stamps.
+        life.live(inputs(4, hand=hand(stamp=CALM_STAMP + k * TICK)), TICK)
     assert life.state.mode.mode is Mode.FOLLOW
     assert all(each.share == 0.0 for each in life.state.stand_ins)
     assert life.setpoints[-1][1] == pytest.approx(REST[4], abs=0.02)
