@@ -5,7 +5,7 @@ from pathlib import Path
 from deploy.launcher.process_table import CONSOLE
 from shared.messages import Flag, Mode
 from shared.nodes import OBSERVER
-from tests.chaos.flight import ROUTER, ChaosFlight, chaos_flight
+from tests.chaos.flight import OBSERVERS, ROUTER, ChaosFlight, chaos_flight
 from tests.chaos.row import Row, judge
 from tests.chaos.steps import (
     CUE_S,
@@ -87,21 +87,24 @@ def kill_bystander(role: str) -> Fly:
 
     def fly(folder: Path) -> Row:
         with chaos_flight(folder, before=add_bystanders) as flight:
-            watch = watch_from_now(flight)
-            flight.kill(f"{role}/0")
+            watch, token = watch_from_now(flight), f"{role}/0"
+            flight.kill(token)
             flight.recorder.listen(2.0)
-            flight.start(f"{role}/0")
-            back = wait(flight, lambda: f"{role}/0" in flight.recorder.present, REJOIN_S)
-            flight.recorder.listen(1.5)
+            flight.start(token)
+            seen = token not in OBSERVERS
+            back = wait(flight, lambda: not seen or token in flight.recorder.present, REJOIN_S)
+            flight.recorder.listen(3.0)
             return judge(
                 f"kill -9 {role}",
                 watch,
-                gone=f"{role}/0",
+                gone=token if seen else None,
                 recovered_s=back,
                 demands=[
-                    (within(watch.cue(f"{role}/0"), CUE_S), "cue by token within 50 ms"),
+                    (not seen or within(watch.cue(token), CUE_S), "cue by token within 50 ms"),
                     (only(watch, Mode.FOLLOW), "nobody even holds"),
+                    (flight.processes[token].poll() is None, "it runs again"),
                 ],
+                notes=[] if seen else ["no observer sees another: judged by its process"],
             )
 
     return fly
