@@ -13,29 +13,35 @@ from shared.topics import ALIVE, DRONE_STATE, FORMATION_STATE, HAND, PATTERN, ST
 
 Rules = dict[str, Any]
 
+OBSERVING_ROLES = (OBSERVER, "console")
 HEARING = ("declare_subscriber", "liveliness_query", "declare_liveliness_subscriber")
 """Messages by which a node says what it wants to hear; nothing in flight depends on their content."""
 
 
 def writes(node: str) -> tuple[str, ...]:
     """Returns the keys that a node may publish on, without the swarm's name."""
-    role, _, number = node.partition("/")
     said = {
         RELAY: (HAND.key(),),
         BRIDGE: (FORMATION_STATE.key(), PATTERN.key()),
         WORLD: (),
         OBSERVER: (),
     }
-    states = said[node] if node in said else (DRONE_STATE.key(id=number),)
-    # There may be any number of observers, each with a number of its own.
-    ident = "*" if node == OBSERVER else number or "0"
-    return (*states, STATUS.key(role=role, id=ident))
+    states = said[node] if node in said else (DRONE_STATE.key(id=node.partition("/")[2]),)
+    return (*states, *(STATUS.key(role=role, id=ident) for role, ident in _names(node)))
 
 
-def presence(node: str) -> str:
-    """Returns the key of a node's liveliness token, without the swarm's name."""
+def presence(node: str) -> tuple[str, ...]:
+    """Returns the keys of a node's liveliness tokens, without the swarm's name."""
+    return tuple(ALIVE.format(role=role, id=ident) for role, ident in _names(node))
+
+
+def _names(node: str) -> list[tuple[str, str]]:
+    """Returns the roles and numbers that a node goes by."""
+    if node == OBSERVER:
+        # There may be any number of observers, each with a number of its own; a console is one.
+        return [(role, "*") for role in OBSERVING_ROLES]
     role, _, number = node.partition("/")
-    return ALIVE.format(role=role, id="*" if node == OBSERVER else number or "0")
+    return [(role, number or "0")]
 
 
 def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
