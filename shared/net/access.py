@@ -65,14 +65,10 @@ def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
         granted = ["hear"] if member != RELAY else []
         if node != RELAY:
             granted += [f"put {member}", f"alive {member}"]
-            rules.append(
-                _rule(f"put {member}", [f"{swarm}/{key}" for key in writes(member)], ["put"], "ingress")
-            )
-            rules.append(
-                _rule(
-                    f"alive {member}", [f"{swarm}/{presence(member)}"], ["liveliness_token", "reply"], "ingress"
-                )
-            )
+            said = [f"{swarm}/{key}" for key in writes(member)]
+            alive = [f"{swarm}/{key}" for key in presence(member)]
+            rules.append(_rule(f"put {member}", said, ["put"], "ingress"))
+            rules.append(_rule(f"alive {member}", alive, ["liveliness_token", "reply"], "ingress"))
         if granted:
             policies.append({"rules": granted, "subjects": [member]})
     subjects: list[Mapping[str, Any]] = [{"id": "anyone"}]
