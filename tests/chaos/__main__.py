@@ -22,11 +22,7 @@ def main() -> int:
     console = Console(highlight=False, width=None if sys.stdout.isatty() else 200)
     rows: list[Row] = []
     for name in arguments.plans or PLANS:
-        plan = PLANS[name]
-        if plan.missing:
-            console.print(f"{name}: left out, {plan.missing}")
-            continue
-        rows.append(plan.fly(arguments.logs / name))
+        rows.append(PLANS[name](arguments.logs / name))
         console.print(f"{name}: {', '.join(rows[-1].failures) or 'as designed'}")
     print_table(rows, console)
     if arguments.csv:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from deploy.launcher.process_table import CONSOLE
 from shared.messages import Flag, Mode
 from shared.nodes import OBSERVER
 from tests.chaos.flight import ROUTER, ChaosFlight, chaos_flight
@@ -11,7 +12,6 @@ from tests.chaos.steps import (
     REJOIN_S,
     Fly,
     all_follow,
-    exists,
     only,
     settle,
     wait,
@@ -152,9 +152,7 @@ def kill_router(folder: Path) -> Row:
 
 
 def add_bystanders(flight: ChaosFlight) -> None:
-    """Adds those who only watch, as far as they exist."""
+    """Adds those who only watch."""
     scenario = ("--scenario", str(flight.folder / "scenario.toml"))
-    if exists("observer.__main__"):
-        flight.add(OBSERVER, "observer", *scenario, "--run-dir", str(flight.folder / "trace"))
-    if exists("observer.console.__main__"):
-        flight.add("console", "observer.console", *scenario, "--port", "0")
+    flight.add(OBSERVER, "observer", *scenario, "--run-dir", str(flight.folder / "trace"))
+    flight.add(CONSOLE, "observer.console", *scenario, "--port", "0")

@@ -10,7 +10,7 @@ from shared.messages import Mode
 from shared.nodes import OBSERVER, WORLD, drone_node
 from tests.chaos.flight import GUEST, PORT, ChaosFlight, chaos_flight
 from tests.chaos.row import Row, judge
-from tests.chaos.steps import REJOIN_S, Fly, all_follow, exists, follow_at, only, wait, watch_from_now, within
+from tests.chaos.steps import REJOIN_S, Fly, all_follow, follow_at, only, wait, watch_from_now, within
 from tests.chaos.watch import references
 
 REST = "scripted:hold"
@@ -112,9 +112,8 @@ def fill_disk(folder: Path) -> Row:
             command = flight.command_of(f"{WORLD}/0")
             place = command.index("--run-dir") + 1
             flight.replace(f"{WORLD}/0", *command[:place], str(disk), *command[place + 1 :])
-            if exists("observer.__main__"):
-                scenario = str(flight.folder / "scenario.toml")
-                flight.add(OBSERVER, "observer", "--scenario", scenario, "--run-dir", str(disk))
+            scenario = str(flight.folder / "scenario.toml")
+            flight.add(OBSERVER, "observer", "--scenario", scenario, "--run-dir", str(disk))
 
         with chaos_flight(folder, before=use) as flight:
             watch = watch_from_now(flight)

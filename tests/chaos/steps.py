@@ -1,6 +1,5 @@
 """What all plans do: watch, wait, and compare with what was demanded."""
 
-import importlib.util
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -19,14 +18,6 @@ REJOIN_S = 12.0
 """Everybody is back so soon, take-off included."""
 SURVIVORS_ERROR = 0.10
 """The survivors stand so well where the repaired graph puts them."""
-
-
-def exists(module: str) -> bool:
-    """Says whether this repository has a module."""
-    try:
-        return importlib.util.find_spec(module) is not None
-    except ModuleNotFoundError:
-        return False
 
 
 def watch_from_now(flight: ChaosFlight, without: Sequence[int] = ()) -> Watch:

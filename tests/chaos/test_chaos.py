@@ -16,8 +16,8 @@ pytestmark = [pytest.mark.container, pytest.mark.timeout(180)]
     "fly",
     [
         *(
-            pytest.param(PLANS[name].fly, id=name)
-            for name in ("restart", "kill-router", "freeze", "part", "garbage", "clock", "disk")
+            pytest.param(PLANS[name], id=name)
+            for name in ("kill-1", "restart", "kill-router", "freeze", "part", "garbage", "clock", "disk")
         ),
         pytest.param(bad_weather(13.0), id="weather"),
     ],
