@@ -82,12 +82,19 @@ def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
     }
 
 
-def deaf(swarm: str) -> Rules:
+def deaf(swarm: str, *, adminspace: bool = False) -> Rules:
     """Builds the relay's own simplex for links without certificates.
 
     The relay takes no sample, token, query or reply from anyone. The one thing that may reach it is which of
     its own keys others want to hear, because a unicast link carries nothing that nobody has asked for.
+
+    Args:
+        swarm: Name of the swarm.
+        adminspace: Whether Zenoh's own state may be asked for, to inspect the relay; off by default.
     """
+    inspect = []
+    if adminspace:  # which no `**` covers
+        inspect = [_rule("ask", ["@/**"], ["query"], "ingress"), _rule("tell", ["@/**"], ["reply"], "egress")]
     own = [f"{swarm}/{HAND.key()}", f"{swarm}/{STATUS.wildcard}", f"{swarm}/alive/**"]
     return {
         "enabled": True,
@@ -95,9 +102,10 @@ def deaf(swarm: str) -> Rules:
         "rules": [
             _rule("out", ["**"], [*HEARING, "put", "reply", "liveliness_token"], "egress"),
             _rule("wanted", own, list(HEARING), "ingress"),
+            *inspect,
         ],
         "subjects": [{"id": "anyone"}],
-        "policies": [{"rules": ["out", "wanted"], "subjects": ["anyone"]}],
+        "policies": [{"rules": ["out", "wanted", *(rule["id"] for rule in inspect)], "subjects": ["anyone"]}],
     }
 
 
