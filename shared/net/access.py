@@ -13,29 +13,35 @@ from shared.topics import ALIVE, DRONE_STATE, FORMATION_STATE, HAND, PATTERN, ST
 
 Rules = dict[str, Any]
 
+OBSERVING_ROLES = (OBSERVER, "console")
 HEARING = ("declare_subscriber", "liveliness_query", "declare_liveliness_subscriber")
 """Messages by which a node says what it wants to hear; nothing in flight depends on their content."""
 
 
 def writes(node: str) -> tuple[str, ...]:
     """Returns the keys that a node may publish on, without the swarm's name."""
-    role, _, number = node.partition("/")
     said = {
         RELAY: (HAND.key(),),
         BRIDGE: (FORMATION_STATE.key(), PATTERN.key()),
         WORLD: (),
         OBSERVER: (),
     }
-    states = said[node] if node in said else (DRONE_STATE.key(id=number),)
-    # There may be any number of observers, each with a number of its own.
-    ident = "*" if node == OBSERVER else number or "0"
-    return (*states, STATUS.key(role=role, id=ident))
+    states = said[node] if node in said else (DRONE_STATE.key(id=node.partition("/")[2]),)
+    return (*states, *(STATUS.key(role=role, id=ident) for role, ident in _names(node)))
 
 
-def presence(node: str) -> str:
-    """Returns the key of a node's liveliness token, without the swarm's name."""
+def presence(node: str) -> tuple[str, ...]:
+    """Returns the keys of a node's liveliness tokens, without the swarm's name."""
+    return tuple(ALIVE.format(role=role, id=ident) for role, ident in _names(node))
+
+
+def _names(node: str) -> list[tuple[str, str]]:
+    """Returns the roles and numbers that a node goes by."""
+    if node == OBSERVER:
+        # There may be any number of observers, each with a number of its own; a console is one.
+        return [(role, "*") for role in OBSERVING_ROLES]
     role, _, number = node.partition("/")
-    return ALIVE.format(role=role, id="*" if node == OBSERVER else number or "0")
+    return [(role, number or "0")]
 
 
 def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
@@ -59,14 +65,10 @@ def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
         granted = ["hear"] if member != RELAY else []
         if node != RELAY:
             granted += [f"put {member}", f"alive {member}"]
-            rules.append(
-                _rule(f"put {member}", [f"{swarm}/{key}" for key in writes(member)], ["put"], "ingress")
-            )
-            rules.append(
-                _rule(
-                    f"alive {member}", [f"{swarm}/{presence(member)}"], ["liveliness_token", "reply"], "ingress"
-                )
-            )
+            said = [f"{swarm}/{key}" for key in writes(member)]
+            alive = [f"{swarm}/{key}" for key in presence(member)]
+            rules.append(_rule(f"put {member}", said, ["put"], "ingress"))
+            rules.append(_rule(f"alive {member}", alive, ["liveliness_token", "reply"], "ingress"))
         if granted:
             policies.append({"rules": granted, "subjects": [member]})
     subjects: list[Mapping[str, Any]] = [{"id": "anyone"}]
@@ -80,12 +82,19 @@ def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
     }
 
 
-def deaf(swarm: str) -> Rules:
+def deaf(swarm: str, *, adminspace: bool = False) -> Rules:
     """Builds the relay's own simplex for links without certificates.
 
     The relay takes no sample, token, query or reply from anyone. The one thing that may reach it is which of
     its own keys others want to hear, because a unicast link carries nothing that nobody has asked for.
+
+    Args:
+        swarm: Name of the swarm.
+        adminspace: Whether Zenoh's own state may be asked for, to inspect the relay; off by default.
     """
+    inspect = []
+    if adminspace:  # which no `**` covers
+        inspect = [_rule("ask", ["@/**"], ["query"], "ingress"), _rule("tell", ["@/**"], ["reply"], "egress")]
     own = [f"{swarm}/{HAND.key()}", f"{swarm}/{STATUS.wildcard}", f"{swarm}/alive/**"]
     return {
         "enabled": True,
@@ -93,9 +102,10 @@ def deaf(swarm: str) -> Rules:
         "rules": [
             _rule("out", ["**"], [*HEARING, "put", "reply", "liveliness_token"], "egress"),
             _rule("wanted", own, list(HEARING), "ingress"),
+            *inspect,
         ],
         "subjects": [{"id": "anyone"}],
-        "policies": [{"rules": ["out", "wanted"], "subjects": ["anyone"]}],
+        "policies": [{"rules": ["out", "wanted", *(rule["id"] for rule in inspect)], "subjects": ["anyone"]}],
     }
 
 

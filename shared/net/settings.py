@@ -66,7 +66,7 @@ def node_settings(
     elif net.profile == "field":
         raise ConfigError("net.keys: profile field needs keys; make them with swarmtouch net keys init")
     elif node == RELAY:
-        mesh["access_control"] = deaf(scenario.swarm.name)
+        mesh["access_control"] = deaf(scenario.swarm.name, adminspace=net.adminspace)
     return [mesh, radio_settings(scenario)] if net.profile == "radio" else [mesh]
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from hypothesis import given
+from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
 
 from agents.control.modes import AIRBORNE_MODES
@@ -91,6 +92,7 @@ def test_no_sequence_moves_the_set_point_faster_than_the_limits(
 
 
 @pytest.mark.parametrize("law", ["paper", "stable"])
+@hypothesis(max_examples=30)
 @given(story=lives, airborne=st.booleans())
 def test_every_state_but_stop_is_left_once_all_is_well_and_the_operator_asks(
     law: str, story: list[tuple[dict[str, Any], int]], airborne: bool

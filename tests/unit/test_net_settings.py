@@ -144,3 +144,10 @@ def test_no_input_of_a_profile_does_more_than_be_refused(
     except SwarmTouchError:
         return
     assert json.loads(json.dumps(settings)) == settings
+
+
+def test_observers_and_consoles_share_a_name_and_may_be_many() -> None:
+    rules = access_control("s", "drone/1", NODES)
+    assert {"s/status/observer/*", "s/status/console/*"} <= granted(rules, "observer", "put")
+    assert granted(rules, "observer", "liveliness_token") == {"s/alive/observer/*", "s/alive/console/*"}
+    assert granted(rules, "drone/2", "liveliness_token") == {"s/alive/drone/2"}

@@ -230,8 +230,8 @@ def extrapolated(reference: Reference) -> Vector:
     """Returns where a silent reference would be by now, at most 0.25 m from where it was last."""
     if reference.fresh:
         return reference.point
-    length = norm(reference.velocity) * reference.age
-    seconds = reference.age if length <= EXTRAPOLATION else reference.age * (EXTRAPOLATION / length)
+    speed = norm(reference.velocity)
+    seconds = min(reference.age, EXTRAPOLATION / speed) if speed > 0.0 else 0.0
     (x, y, z), (u, v, w) = reference.point, reference.velocity
     return (x + u * seconds, y + v * seconds, z + w * seconds)
 
