@@ -19,6 +19,8 @@ from shared.scenario import Scenario
 Settings = dict[str, Any]
 
 LEASE_MS = 1000
+KEEP_ALIVES = 10
+"""How often per lease an idle link says so: with four, a datagram link that loses a fifth ends in minutes."""
 RADIO_GROUP, RADIO_PORT = "udp/224.0.0.225", 7450
 JOIN_INTERVAL_MS = 500
 """How often the radio tells newcomers how to listen: a receiver that starts late waits at most this long."""
@@ -113,7 +115,7 @@ def _node(mode: str, listen: str, connect: Sequence[str]) -> Settings:
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
             "unicast": {"open_timeout": OPEN_TIMEOUT_MS, "max_sessions": MAX_SESSIONS},
-            "link": {"tx": {"lease": LEASE_MS, "keep_alive": 4}},
+            "link": {"tx": {"lease": LEASE_MS, "keep_alive": KEEP_ALIVES}},
             "shared_memory": {"enabled": False},
         },
     }

@@ -23,7 +23,7 @@ def partition(seconds: float) -> Fly:
     """Parts the human and drone 1 from the rest."""
 
     def fly(folder: Path) -> Row:
-        with chaos_flight(folder) as flight:
+        with chaos_flight(folder, protocol="udp") as flight:
             recorder, lab = flight.recorder, flight.lab
             rest = tuple(drone for drone in flight.ids if drone != 1)
             watch = Watch(flight, recorder.clock(), rest)
@@ -60,7 +60,7 @@ def partition(seconds: float) -> Fly:
 
 def lose_packets(folder: Path) -> Row:
     """Loses a fifth of all packets for 10 s."""
-    with chaos_flight(folder, protocol="quic") as flight:
+    with chaos_flight(folder, protocol="udp") as flight:
         flight.lab.lose(0.2)
         watch = watch_from_now(flight)
         flight.recorder.listen(10.0)
@@ -106,7 +106,7 @@ def bad_weather(seconds: float) -> Fly:
     """Follows the same motion twice, in fair weather and in bad."""
 
     def fly(folder: Path) -> Row:
-        with chaos_flight(folder, "scripted:eight?peak=0.4", emulated=True, protocol="quic") as flight:
+        with chaos_flight(folder, "scripted:eight?peak=0.4", emulated=True, protocol="udp") as flight:
             fair = watch_from_now(flight)
             flight.recorder.listen(seconds)
             fair_rms = fair.tracking_rms()
