@@ -114,6 +114,9 @@ class Lab:
             with suppress(OSError):
                 self._emulator.communicate(timeout=5.0)
             self._emulator = None
+        # A namespace goes when the kernel gets round to it, and its end of the cable with it: do not wait.
+        if Path(f"/sys/class/net/{UPLINK}").exists():
+            _run("ip", "link", "del", UPLINK)
         for space in Path("/run/netns").glob(f"{PREFIX}*"):
             _run("ip", "netns", "del", space.name)
 
