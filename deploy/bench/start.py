@@ -20,10 +20,9 @@ from attrs import frozen
 from deploy.bench.figures import TEXT_COLUMNS, spread
 from deploy.bench.report import INK, Report, Sheet
 from deploy.bench.swarm import BenchError
-from deploy.launcher.launch import SCENARIO_FILE
 from deploy.launcher.monitor import Monitor
-from deploy.launcher.run_directory import LATEST
 from observer.flight_stats import FlightStats
+from observer.swarm import LATEST, SCENARIO_FILE
 from shared.bus import join
 from shared.clock import NS_PER_S, Clock, system_clock
 from shared.config import load_scenario

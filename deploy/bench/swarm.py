@@ -17,6 +17,7 @@ from deploy.bench.usage import Usage, read_usage
 from deploy.launcher.ports import free_ports
 from deploy.launcher.process_table import RELAY, ProcessRow, process_table, resolve_scenario
 from deploy.launcher.supervisor import Child, Supervisor
+from observer.swarm import SCENARIO_FILE
 from shared.bus import ZenohBus, join
 from shared.config import dump_scenario
 from shared.errors import SwarmTouchError
@@ -92,7 +93,7 @@ def fly(
     scenario = resolve_scenario(scenario, formation, tcp_ports, udp_port)
     with tempfile.TemporaryDirectory() as folder, _observer(scenario, formation) as bus:
         run_dir = Path(folder)
-        file = run_dir / "scenario.toml"
+        file = run_dir / SCENARIO_FILE
         file.write_text(dump_scenario(scenario), encoding="utf-8")
         rows = process_table(scenario, formation, file=file, hand=HAND, run_dir=run_dir)
         ear = FlightEar(bus, formation)

@@ -30,6 +30,7 @@ from human_relay.sources import source_hints
 from observer.console import PORT
 from observer.console.arguments import TOKEN_VARIABLE
 from observer.console.pattern_file import PATTERN_FILE
+from observer.swarm import SCENARIO_FILE
 from shared.bus import join
 from shared.clock import system_clock
 from shared.config import dump_scenario, load_scenario
@@ -39,7 +40,6 @@ from shared.nodes import OBSERVER, all_nodes
 from shared.pointer_link import LOOPBACK
 from shared.scenario import Scenario
 
-SCENARIO_FILE = "scenario.toml"
 SUMMARY_FILE = "summary.json"
 
 

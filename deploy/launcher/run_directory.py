@@ -4,7 +4,7 @@ import itertools
 import time
 from pathlib import Path
 
-LATEST = "latest"
+from observer.swarm import LATEST
 
 
 def create_run_directory(runs: Path) -> Path:

@@ -3,9 +3,9 @@
 import importlib
 from typing import cast
 
-from human_relay.sources.base import HandBackend, HandSource, SourceUri
+from human_relay.sources.base import HandBackend, HandSource
 from shared.errors import ConfigError
-from shared.uri import parse_uri
+from shared.uri import Uri, parse_uri
 
 BACKENDS = {
     "scripted": ("human_relay.sources.scripted", "ScriptedHand"),
@@ -46,7 +46,7 @@ def source_hints(uri: str) -> dict[str, object]:
     return _backend(parsed).hints(parsed)
 
 
-def _backend(uri: SourceUri) -> HandBackend:
+def _backend(uri: Uri) -> HandBackend:
     if uri.scheme not in BACKENDS:
         known = ", ".join(f"{scheme}:" for scheme in BACKENDS)
         raise ConfigError(f"{uri.text}: unknown hand source {uri.scheme!r}; known ones: {known}")

@@ -25,7 +25,6 @@ class HandPose:
     t_ns: int
 
 
-SourceUri = Uri
 """What a backend is opened with."""
 
 
@@ -56,10 +55,10 @@ class HandSource(Protocol):
 class HandBackend(Protocol):
     """A class of sources, as the backend table loads it."""
 
-    def __call__(self, uri: SourceUri, start_ns: int) -> HandSource:
+    def __call__(self, uri: Uri, start_ns: int) -> HandSource:
         """Opens a source whose own time starts at `start_ns` (clock of the process)."""
         ...
 
-    def hints(self, uri: SourceUri) -> dict[str, object]:
+    def hints(self, uri: Uri) -> dict[str, object]:
         """Returns what the source knows about the mapping: dotted scenario keys and their values."""
         ...

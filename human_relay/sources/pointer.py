@@ -12,11 +12,12 @@ from urllib.parse import urlsplit
 from attrs import evolve
 
 from human_relay.pointing import Limits, PointerState, advance, hear, is_watched
-from human_relay.sources.base import HandPose, SourceUri
+from human_relay.sources.base import HandPose
 from human_relay.sources.playback import PERIOD_NS
 from shared.errors import ConfigError, DecodeError, DeviceError
 from shared.messages import NO_HAND, Wish
 from shared.pointer_link import DEFAULT_PORT, LOOPBACK, MAX_DATAGRAM, decode_pointed
+from shared.uri import Uri
 
 SPEED = 0.75
 """Derated as the paper's law wants it, m/s."""
@@ -30,7 +31,7 @@ _log = logging.getLogger("pointer")
 class PointerHand:
     """The `pointer:` backend."""
 
-    def __init__(self, uri: SourceUri, start_ns: int) -> None:
+    def __init__(self, uri: Uri, start_ns: int) -> None:
         """Listens at once.
 
         Raises:
@@ -51,7 +52,7 @@ class PointerHand:
             raise DeviceError(f"{uri.text}: cannot listen: {error}; is another relay running?") from error
 
     @staticmethod
-    def hints(uri: SourceUri) -> dict[str, object]:
+    def hints(uri: Uri) -> dict[str, object]:
         """A pointer points in the world frame: it says nothing about the mapping."""
         pointer_address(uri)
         _limits(uri)
@@ -114,7 +115,7 @@ class PointerHand:
                     _log.warning("dropped a datagram: %s (so far %d)", error, self._rejected)
 
 
-def _limits(uri: SourceUri) -> Limits:
+def _limits(uri: Uri) -> Limits:
     uri.refuse_unknown("speed", "acceleration")
     return Limits(
         speed=uri.number("speed", SPEED, low=0.01, high=3.0),
@@ -122,7 +123,7 @@ def _limits(uri: SourceUri) -> Limits:
     )
 
 
-def pointer_address(uri: SourceUri) -> tuple[str, int]:
+def pointer_address(uri: Uri) -> tuple[str, int]:
     """Returns host and port that a pointer listens on.
 
     Raises:

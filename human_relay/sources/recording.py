@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from human_relay.sources.base import HandPose, SourceUri
+from human_relay.sources.base import HandPose
 from human_relay.sources.playback import PERIOD_NS, Playback
 from shared.clock import NS_PER_S
 from shared.csv_table import Stamps, Vec, read_rows, read_table
@@ -25,6 +25,7 @@ from shared.flight_folder import (
     read_track,
 )
 from shared.messages import Wish
+from shared.uri import Uri
 
 BAG_TOPIC = "/vicon/glove/glove"
 
@@ -32,7 +33,7 @@ BAG_TOPIC = "/vicon/glove/glove"
 class RecordedHand(Playback):
     """The `recording:` backend."""
 
-    def __init__(self, uri: SourceUri, start_ns: int) -> None:
+    def __init__(self, uri: Uri, start_ns: int) -> None:
         """Reads the whole recording.
 
         Raises:
@@ -47,7 +48,7 @@ class RecordedHand(Playback):
         super().__init__(_poses(start_ns, t_ns, track.position, relative_yaw(track.quaternion)))
 
     @staticmethod
-    def hints(uri: SourceUri) -> dict[str, object]:
+    def hints(uri: Uri) -> dict[str, object]:
         """A flight folder knows the law that flew (`base = clip(c + gain * hand_xy)`) and its columns.
 
         `hand.home` is where that law puts the first hand position, before any obstacle.
@@ -130,7 +131,7 @@ def relative_yaw(quaternion: Vec) -> Vec:
     return relative
 
 
-def _path(uri: SourceUri) -> Path:
+def _path(uri: Uri) -> Path:
     if not uri.path:
         raise ConfigError(f"{uri.text}: no path; for example recording:flights/S2_visual_1")
     return Path(uri.path).expanduser()

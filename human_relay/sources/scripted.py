@@ -17,11 +17,12 @@ from collections.abc import Callable, Iterator
 
 from attrs import frozen
 
-from human_relay.sources.base import HandPose, SourceUri
+from human_relay.sources.base import HandPose
 from human_relay.sources.playback import Playback
 from shared.clock import NS_PER_S
 from shared.errors import ConfigError
 from shared.messages import Vector, Wish
+from shared.uri import Uri
 
 REST: Vector = (0.0, 0.0, 1.2)
 RATE_HZ = 60
@@ -52,7 +53,7 @@ class Segment:
 class ScriptedHand(Playback):
     """The `scripted:` backend."""
 
-    def __init__(self, uri: SourceUri, start_ns: int) -> None:
+    def __init__(self, uri: Uri, start_ns: int) -> None:
         """Builds the script of a URI.
 
         Raises:
@@ -61,7 +62,7 @@ class ScriptedHand(Playback):
         super().__init__(_poses(_segments(uri), *_span(uri), start_ns))
 
     @staticmethod
-    def hints(uri: SourceUri) -> dict[str, object]:
+    def hints(uri: Uri) -> dict[str, object]:
         """A script moves in the world frame as it is: it says nothing about the mapping."""
         _segments(uri)
         return {}
@@ -72,7 +73,7 @@ def minimum_jerk(fraction: float) -> float:
     return fraction**3 * (10.0 - 15.0 * fraction + 6.0 * fraction**2)
 
 
-def _segments(uri: SourceUri) -> list[Segment]:
+def _segments(uri: Uri) -> list[Segment]:
     uri.refuse_unknown("duration", "peak", "lead", *(("heading", "stroke") if uri.path == "sweep" else ()))
     _span(uri)
     peak = uri.number("peak", 0.5, low=0.01, high=2.0)
@@ -91,7 +92,7 @@ def _segments(uri: SourceUri) -> list[Segment]:
     raise ConfigError(f"{uri.text}: no script {uri.path!r}; scripts: tour, sweep, eight, hold")
 
 
-def _span(uri: SourceUri) -> tuple[float, float]:
+def _span(uri: Uri) -> tuple[float, float]:
     """Returns (lead, duration), s; a duration of 0 stands for that of the script itself."""
     lead = uri.number("lead", 4.0, low=0.0, high=60.0)
     endless = 0.0 if uri.path == "sweep" else math.inf

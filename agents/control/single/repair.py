@@ -96,7 +96,11 @@ class Guide(NamedTuple):
 
 def nobody_gone(kin: Sequence[Kin]) -> tuple[StandIn, ...]:
     """Returns the state in which every ancestor speaks for itself."""
-    return tuple(StandIn(0.0, 0.0, (AT_REST,) * len(each.row.links)) for each in kin)
+    return tuple(_absent(each) for each in kin)
+
+
+def _absent(kin: Kin) -> StandIn:
+    return StandIn(0.0, 0.0, (AT_REST,) * len(kin.row.links))
 
 
 def is_fit(reference: Reference | None) -> bool:
@@ -141,7 +145,7 @@ def _advance(
     else:
         share -= dt / BLEND
     if share <= 0.0:
-        return nobody_gone((kin,))[0]
+        return _absent(kin)
     return StandIn(share, heard_for, step_links(links, kin.row.links, hand_velocity, dt))
 
 
