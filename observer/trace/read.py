@@ -29,7 +29,7 @@ from shared.scenario import Scenario
 from shared.topics import DRONE_STATE, topic_of
 
 _LARGEST_RECORD = 1 << 28
-_DAMAGE = (McapError, ZstdError, struct.error, ValueError, RuntimeError)
+_DAMAGE = (MemoryError, McapError, ZstdError, struct.error, ValueError, RuntimeError)
 
 
 class Record(NamedTuple):
