@@ -75,7 +75,12 @@ class Phase:
 
 
 def fly(
-    scenario: Scenario, formation: Formation, seconds: float, *, edit: Edit = lambda row: row
+    scenario: Scenario,
+    formation: Formation,
+    seconds: float,
+    *,
+    edit: Edit = lambda row: row,
+    recorded_to: Path | None = None,
 ) -> tuple[FlightEar, Phase]:
     """Flies real agents in the simulated world and measures for a while in mid-flight.
 
@@ -84,6 +89,7 @@ def fly(
         formation: Its formation.
         seconds: Length of the measurement.
         edit: Changes rows of the process table.
+        recorded_to: Where a recorder leaves its trace; None for no recorder.
 
     Raises:
         BenchError: A process ended.
@@ -92,10 +98,11 @@ def fly(
     tcp_ports, (udp_port,) = free_ports(tcp=len(all_nodes(formation)), udp=1)
     scenario = resolve_scenario(scenario, formation, tcp_ports, udp_port)
     with tempfile.TemporaryDirectory() as folder, _observer(scenario, formation) as bus:
-        run_dir = Path(folder)
+        run_dir = recorded_to or Path(folder)
         file = run_dir / SCENARIO_FILE
         file.write_text(dump_scenario(scenario), encoding="utf-8")
-        rows = process_table(scenario, formation, file=file, hand=HAND, run_dir=run_dir)
+        record = recorded_to is not None
+        rows = process_table(scenario, formation, file=file, hand=HAND, run_dir=run_dir, record=record)
         ear = FlightEar(bus, formation)
         return ear, _run([edit(row) for row in rows], ear, seconds, len(formation.ids))
 
