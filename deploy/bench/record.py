@@ -17,12 +17,11 @@ from deploy.bench.figures import TEXT_COLUMNS, spread
 from deploy.bench.flight_ear import FlightEar
 from deploy.bench.report import Json, Report, Sheet
 from deploy.bench.swarm import Phase, fly
-from deploy.launcher.process_table import OBSERVER
-from observer.link_stats import OBSERVER as RECORDER
 from observer.link_stats import SwarmLinks
 from observer.trace.read import open_trace
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
+from shared.nodes import OBSERVER
 from shared.scenario import Scenario
 
 NAMES = {False: "not recorded", True: "recorded"}
@@ -106,7 +105,7 @@ def _read(folder: Path) -> Taken:
     for record, message in trace.messages():
         swarm.add(record.key, message, record.log_ns)
         number += 1
-    missing = {row.key: row.missing for row in swarm.rows() if row.listener == RECORDER}
+    missing = {row.key: row.missing for row in swarm.rows() if row.listener == OBSERVER}
     return Taken(messages=number, missing=missing, dropped=trace.dropped)
 
 

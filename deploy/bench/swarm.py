@@ -15,14 +15,14 @@ from deploy.bench.floor_ear import FloorEar, UdpEar, ZenohEar
 from deploy.bench.floor_rows import udp_rows, zenoh_rows
 from deploy.bench.usage import Usage, read_usage
 from deploy.launcher.ports import free_ports
-from deploy.launcher.process_table import RELAY, ProcessRow, process_table, resolve_scenario
+from deploy.launcher.process_table import ProcessRow, process_table, resolve_scenario
 from deploy.launcher.supervisor import Child, Supervisor
 from observer.swarm import SCENARIO_FILE
 from shared.bus import ZenohBus, join
 from shared.config import dump_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import Formation
-from shared.nodes import OBSERVER, all_nodes
+from shared.nodes import OBSERVER, RELAY, all_nodes
 from shared.scenario import Scenario
 
 HAND = "scripted:tour"

@@ -19,7 +19,7 @@ from attrs import frozen
 from deploy.bench.usage import read_usage
 from deploy.launcher.ports import free_ports
 from deploy.launcher.process_table import resolve_scenario
-from observer.link_stats import OBSERVER, SwarmLinks
+from observer.link_stats import SwarmLinks
 from observer.swarm import open_observer
 from observer.trace.layout import trace_files
 from observer.trace.read import Record, open_trace
@@ -29,7 +29,7 @@ from shared.clock import NS_PER_S, system_clock
 from shared.codec import encode
 from shared.formation import build_formation
 from shared.messages import Message, Mode, ProcessStatus
-from shared.nodes import all_nodes
+from shared.nodes import OBSERVER, all_nodes
 from shared.scenario import Net
 from shared.topics import DRONE_STATE, HAND, TOPICS
 from shared.transport import Arrival, Inbox
