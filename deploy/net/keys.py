@@ -10,6 +10,7 @@ from rich.table import Table
 
 from deploy.net.authority import WARN_DAYS, create, issue, issued, remove
 from shared.config import load_scenario
+from shared.errors import ConfigError
 from shared.formation import build_formation
 from shared.net.keyring import Keyring
 from shared.nodes import all_nodes
@@ -41,7 +42,10 @@ def run(arguments: argparse.Namespace) -> int:
 def _hosts(scenario: Scenario, node: str) -> tuple[str, ...]:
     """Returns the host under which the scenario has others dial a node."""
     address = scenario.net.endpoints.get(node, "")
-    host = urlsplit(f"//{address.partition('/')[2]}").hostname if address else None
+    try:
+        host = urlsplit(f"//{address.partition('/')[2]}").hostname
+    except ValueError as error:
+        raise ConfigError(f"net.endpoints.{node}: {address!r}: {error}") from error
     return (host,) if host else ()
 
 
