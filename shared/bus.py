@@ -23,6 +23,7 @@ from shared.errors import DeviceError
 from shared.formation import Formation
 from shared.net.audit import LOG_FILTER, Audit
 from shared.net.keyring import Keyring
+from shared.net.linger import stop_lingering
 from shared.net.log_tap import tap_stdout
 from shared.net.settings import Settings, node_settings, router_settings
 from shared.scenario import Scenario
@@ -66,7 +67,9 @@ class ZenohBus:
         self._sessions: list[zenoh.Session] = []
         self._audit: Audit | None = None
         for each in (settings, *ears):
-            self._sessions.append(_open(each))
+            session = _open(each)
+            self._sessions.append(session)
+            self._declared.append(_let_dead_links_go(session))
 
     def watch_links(self, audit: Audit) -> None:
         """Tells an audit of every link of the publishing session, and of what Zenoh refuses on it.
@@ -188,10 +191,12 @@ def routing(listen: str) -> Iterator[None]:
         DeviceError: The endpoint cannot be listened on.
     """
     session = _open(router_settings(listen))
+    watching = _let_dead_links_go(session)
     try:
         yield
     finally:
-        session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        watching.undeclare()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        session.close()  # type: ignore[no-untyped-call]  # as above
 
 
 def _open(settings: Settings) -> zenoh.Session:
@@ -204,6 +209,15 @@ def _open(settings: Settings) -> zenoh.Session:
         raise DeviceError(
             f"cannot open the bus at {where}: {error}. Is the port in use? Set net.endpoints or net.base_port"
         ) from error
+
+
+def _let_dead_links_go(session: zenoh.Session) -> "zenoh.LinkEventsListener[None]":
+    def changed(event: zenoh.LinkEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT:
+            stop_lingering()
+
+    handler = zenoh.handlers.Callback(changed, indirect=False)
+    return session.info.declare_link_events_listener(handler, history=True)
 
 
 def _give_up() -> None:
