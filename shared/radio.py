@@ -85,15 +85,15 @@ class Transmitter:
             self._unsent += 1
             if (now := self._clock()) >= self._retry_ns and not self._closed:
                 self._retry_ns = now + _RETRY_NS
-                _log.warning("cannot send to %s: %s (so far %d)", self._group, error, self._unsent)
-                self._reopen()
+                self._reopen(error)
 
-    def _reopen(self) -> None:
+    def _reopen(self, reason: Exception) -> None:
         self._socket.close()
         try:
             self._socket = _open(self._group, _prepare_to_send)
         except DeviceError as error:
-            _log.warning("%s", error)
+            reason = error
+        _log.warning("cannot send: %s (so far %d)", reason, self._unsent)
 
 
 class Receiver:
@@ -220,8 +220,7 @@ def _open(group: RadioGroup, prepare: Callable[[socket.socket, RadioGroup, bytes
     except (OSError, ValueError) as error:
         opened.close()
         raise DeviceError(
-            f"no radio on {group.interface} ({group.address}:{group.port}): {error}; set net.interface to a"
-            " network interface that is up and has an address"
+            f"no radio at {group}: {error}; set net.interface to one that is up and has an address"
         ) from error
     return opened
 

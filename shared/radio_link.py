@@ -39,6 +39,9 @@ class RadioGroup(NamedTuple):
     port: int
     interface: str
 
+    def __str__(self) -> str:
+        return f"{self.address}:{self.port} on {self.interface}"
+
 
 class Said(NamedTuple):
     """A decoded datagram: which swarm it is for, the key without the swarm's name, and the payload."""

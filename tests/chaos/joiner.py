@@ -1,8 +1,8 @@
 """Two members of a swarm: `python -m tests.chaos.joiner SCENARIO DRONE [JOINS]`.
 
-Drone 1 stays: it says again on its own key what it has heard last of the other. Drone 2 joins so many times, each
-time with a word of its own, and prints a line with the seconds until that word has come back: until then it has
-been heard, and has heard.
+Drone 1 stays: it says again on its own key what it has heard last of the other. Drone 2 joins so many times,
+each time with a word of its own, and prints a line with the seconds until that word has come back: by then it
+has been heard, and has heard.
 """
 
 import sys

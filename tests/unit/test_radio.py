@@ -217,5 +217,5 @@ def test_a_closed_transmitter_stays_silent(
 def test_an_interface_that_is_not_there_is_named(group: RadioGroup, swarm: str) -> None:
     absent = group._replace(interface="absent0")
     for make in (lambda: make_receiver(absent, swarm), lambda: Transmitter(absent, swarm, time.monotonic_ns)):
-        with pytest.raises(DeviceError, match=r"no radio on absent0 .*set net\.interface"):
+        with pytest.raises(DeviceError, match=r"no radio at .* on absent0: .*set net\.interface"):
             make()
