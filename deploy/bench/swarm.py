@@ -18,12 +18,13 @@ from deploy.launcher.ports import free_ports
 from deploy.launcher.process_table import ProcessRow, process_table, resolve_scenario
 from deploy.launcher.supervisor import Child, Supervisor
 from observer.swarm import SCENARIO_FILE
-from shared.bus import ZenohBus, join
+from shared.bus import join
 from shared.config import dump_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import Formation
 from shared.nodes import OBSERVER, RELAY, all_nodes
 from shared.scenario import Scenario
+from shared.transport import Bus
 
 HAND = "scripted:tour"
 WARM_UP_S = 1.0
@@ -135,7 +136,7 @@ def fly_bare_udp(
         return ear, _run(rows, ear, seconds, len(formation.ids))
 
 
-def _observer(scenario: Scenario, formation: Formation) -> ZenohBus:
+def _observer(scenario: Scenario, formation: Formation) -> Bus:
     return join(scenario, formation, OBSERVER)
 
 
