@@ -6,8 +6,8 @@ from attrs import frozen
 
 from shared.messages import DroneState, Flag, ProcessStatus
 from shared.net.audit import LINKED, REFUSED
+from shared.nodes import DRONE, RELAY, WORLD
 
-DRONE, RELAY, WORLD = "drone", "relay", "world"
 WELL_STATES = ("running", "starting")
 WORRYING = (
     Flag.BLOCKED | Flag.FENCE | Flag.LOW_BATTERY | Flag.CRITICAL_BATTERY | Flag.OLD_POSE | Flag.HAND_STALE

@@ -1,8 +1,9 @@
 """Zenoh's configuration of any node in any profile, generated from the scenario.
 
 The facts behind the settings are measured: links found by gossip never heal after a partition, so every link is
-static; best effort over QUIC with `mixed_rel` keeps 0.5 ms under 20 % loss where TCP needs 30; multicast knows
-neither TLS nor access rules, so the radio is a session of its own on which nobody but the relay speaks.
+static; best effort over QUIC with `mixed_rel` keeps 0.5 ms under 20 % loss where TCP needs 30; over UDP a lost
+declaration is never repeated and leaves a node deaf for good, so TCP goes beside it. The hand's radio is not
+Zenoh's: one malformed datagram in the group ends a multicast session of Zenoh for good (`shared.radio`).
 """
 
 from collections.abc import Sequence
@@ -21,9 +22,6 @@ Settings = dict[str, Any]
 LEASE_MS = 1000
 KEEP_ALIVES = 10
 """How often per lease an idle link says so: with four, a datagram link that loses a fifth ends in minutes."""
-RADIO_GROUP, RADIO_PORT = "udp/224.0.0.225", 7450
-JOIN_INTERVAL_MS = 500
-"""How often the radio tells newcomers how to listen: a receiver that starts late waits at most this long."""
 MAX_PUT_BYTES = 16_384
 """Zenoh drops larger ones uncounted; what is over the codec's 4 KiB but under this is counted as oversized."""
 MAX_MESSAGE_BYTES = 65_536
@@ -33,10 +31,8 @@ OPEN_TIMEOUT_MS = 1500
 """Closing waits for every attempt to dial somebody who is not there: less than `bus.CLOSE_TIMEOUT_S`."""
 
 
-def node_settings(
-    scenario: Scenario, formation: Formation, node: str, *, listening: bool = True
-) -> list[Settings]:
-    """Builds the configuration of every Zenoh session of one node.
+def node_settings(scenario: Scenario, formation: Formation, node: str, *, listening: bool = True) -> Settings:
+    """Builds the configuration of one node's Zenoh session.
 
     Args:
         scenario: The scenario; `net` says how.
@@ -44,21 +40,20 @@ def node_settings(
         node: Name of the node (`shared.nodes`).
         listening: False for a node that nobody dials, as any number of observers are.
 
-    Returns:
-        The session that the node publishes on first, then those that it only listens to.
-
     Raises:
-        ConfigError: The profile wants keys that are not there.
+        ConfigError: The profile wants keys that are not there, or the node has no session.
     """
     net = scenario.net
     if net.profile == "radio" and node == RELAY:
-        return [radio_settings(scenario)]
+        raise ConfigError(
+            "net.profile: in radio the relay has no Zenoh session, it sends to net.multicast only"
+        )
     if net.router is not None:
         if net.keys:
             raise ConfigError(
                 "net.router: a router would speak for everybody; with net.keys nodes link directly"
             )
-        return [client_settings(scenario.swarm.name, net.router, adminspace=net.adminspace)]
+        return client_settings(scenario.swarm.name, net.router, adminspace=net.adminspace)
     own, others = endpoint(scenario, formation, node), dials(scenario, formation, node)
     # Who listens in the same place, as the launcher does in an observer's, is heard as well.
     listen, connect = (own, others) if listening else ("", [*others, own])
@@ -69,7 +64,7 @@ def node_settings(
         raise ConfigError("net.keys: profile field needs keys; make them with swarmtouch net keys init")
     elif node == RELAY:
         mesh["access_control"] = deaf(scenario.swarm.name, adminspace=net.adminspace)
-    return [mesh, radio_settings(scenario)] if net.profile == "radio" else [mesh]
+    return mesh
 
 
 def peer_settings(
@@ -79,31 +74,47 @@ def peer_settings(
 
     Args:
         namespace: Name of the swarm, prefix of every key.
-        listen: Own endpoint, empty to listen nowhere.
-        connect: Endpoints to dial, again and again until they answer.
+        listen: Own endpoint, empty to listen nowhere; with `udp/` goes `tcp/` on the same port.
+        connect: Endpoints to dial, again and again until they answer; the same holds for them.
         adminspace: Whether to answer adminspace queries.
     """
-    return {
-        **_node("peer", listen, connect),
+    heard, dialled = _links(listen), [link for endpoint in connect for link in _links(endpoint)]
+    settings = _member(namespace, _node("peer", heard, dialled), adminspace=adminspace)
+    if any(link.startswith("udp/") for link in (*heard, *dialled)):
+        # Only here: the key pair by which links prove that they belong together takes 20 ms to make.
+        settings["transport"]["unicast"]["max_links"] = 2
+    return settings
+
+
+def client_settings(namespace: str, router: str, *, adminspace: bool = False) -> Settings:
+    """Builds the configuration of a client of one router; arguments as for `peer_settings`."""
+    return _member(namespace, _node("client", (), (router,)), adminspace=adminspace)
+
+
+def router_settings(listen: str) -> Settings:
+    """Builds the configuration of a router that forwards between its clients, of all swarms."""
+    return _node("router", (listen,), ())
+
+
+def _links(endpoint: str) -> tuple[str, ...]:
+    """Returns the links behind an endpoint: with UDP for samples goes TCP, on the same port, for all else."""
+    protocol, _, address = endpoint.partition("/")
+    if protocol == "udp":
+        return f"tcp/{address}?rel=1", f"udp/{address}?rel=0"
+    return (endpoint,) if endpoint else ()
+
+
+def _member(namespace: str, node: Settings, *, adminspace: bool = False) -> Settings:
+    return node | {
         "namespace": namespace,
         "adminspace": {"enabled": adminspace, "permissions": {"read": True, "write": False}},
     }
 
 
-def client_settings(namespace: str, router: str, *, adminspace: bool = False) -> Settings:
-    """Builds the configuration of a client of one router; arguments as for `peer_settings`."""
-    return peer_settings(namespace, "", adminspace=adminspace) | _node("client", "", [router])
-
-
-def router_settings(listen: str) -> Settings:
-    """Builds the configuration of a router that forwards between its clients, of all swarms."""
-    return _node("router", listen, ())
-
-
-def _node(mode: str, listen: str, connect: Sequence[str]) -> Settings:
+def _node(mode: str, listen: Sequence[str], connect: Sequence[str]) -> Settings:
     return {
         "mode": mode,
-        "listen": {"endpoints": [listen] if listen else [], "exit_on_failure": True},
+        "listen": {"endpoints": list(listen), "exit_on_failure": True},
         "connect": {
             "endpoints": list(connect),
             # Peers dial in the background for ever; a client can only wait, and is deaf to signals meanwhile.
@@ -119,14 +130,6 @@ def _node(mode: str, listen: str, connect: Sequence[str]) -> Settings:
             "shared_memory": {"enabled": False},
         },
     }
-
-
-def radio_settings(scenario: Scenario) -> Settings:
-    """Builds the session on the hand's multicast group: the relay speaks there, everybody else only listens."""
-    group = f"{scenario.net.multicast or f'{RADIO_GROUP}:{RADIO_PORT}'}#iface={scenario.net.interface}"
-    settings = peer_settings(scenario.swarm.name, group)
-    settings["transport"]["multicast"] = {"join_interval": JOIN_INTERVAL_MS}
-    return settings
 
 
 def _secure(settings: Settings, keyring: Keyring, swarm: str, node: str) -> None:

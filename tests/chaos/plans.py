@@ -3,6 +3,7 @@
 from tests.chaos.kills import kill_bystander, kill_drones, kill_relay, kill_router, restart_drone
 from tests.chaos.links import bad_weather, lose_packets, partition, silence_vehicle
 from tests.chaos.processes import fill_disk, freeze, step_clock, talk
+from tests.chaos.radio import simplex
 from tests.chaos.steps import Fly
 
 PLANS: dict[str, Fly] = {
@@ -15,6 +16,7 @@ PLANS: dict[str, Fly] = {
     "kill-console": kill_bystander("console"),
     "kill-router": kill_router,
     "unheard": silence_vehicle,
+    "simplex": simplex,
     "freeze": freeze,
     "part": partition(8.0),
     "part-long": partition(20.0),

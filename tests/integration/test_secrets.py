@@ -34,7 +34,7 @@ def keys(tmp_path: Path) -> Keyring:
 
 
 def needles(keys: Keyring) -> dict[str, bytes]:
-    """Returns what would give a private key away: its bytes, as they are and as text, and the lines of its file."""
+    """Returns what gives a private key away: its bytes, as they are and as text, and the lines of its file."""
     found: dict[str, bytes] = {}
     for file in keys.folder.glob("*.key"):
         pem = file.read_bytes()
