@@ -179,7 +179,7 @@ def test_status_tells_of_links_and_refusals_by_name(field: Swarm) -> None:
     rows = {row.token: row for row in listen(field.scenario)}
     assert {"relay", "drone/2", "drone/3", "drone/4", "observer"} <= set(rows[VICTIM].links)
     assert rows[VICTIM].refused[f"drone/2 put rhombus/{HAND.key()}"] >= 0.9 * FLOOD
-    assert set(rows[RELAY].refused) == {f"drone/2 put rhombus/{DRONE_STATE.key(id=2)}"}
+    assert f"drone/2 put rhombus/{DRONE_STATE.key(id=2)}" in rows[RELAY].refused
 
 
 def test_refusals_are_logged_with_a_name_at_a_limited_rate(field: Swarm) -> None:
