@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from shared.bus import ZenohBus, join
+from shared.bus import join
 from shared.config import load_scenario
 from shared.errors import ConfigError
 from shared.formation import build_formation
 from shared.nodes import OBSERVER
 from shared.scenario import Scenario
+from shared.transport import Bus
 
 RUNS = Path("runs")
 """Where the launcher keeps flights."""
@@ -18,7 +19,7 @@ SCENARIO_FILE = "scenario.toml"
 """The resolved scenario inside a run."""
 
 
-def open_observer(scenario: Scenario) -> ZenohBus:
+def open_observer(scenario: Scenario) -> Bus:
     """Opens a bus to every node of a swarm, the launcher included; any number of observers may do so at once.
 
     Args:

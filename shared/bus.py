@@ -21,19 +21,24 @@ import zenoh
 from shared.clock import system_clock
 from shared.errors import DeviceError
 from shared.formation import Formation
+from shared.net.access import presence, writes
 from shared.net.audit import LOG_FILTER, Audit
 from shared.net.keyring import Keyring
 from shared.net.linger import stop_lingering
 from shared.net.log_tap import tap_stdout
 from shared.net.settings import Settings, node_settings, router_settings
+from shared.nodes import RELAY
+from shared.radio import Receiver, Transmitter
+from shared.radio_link import radio_group
 from shared.scenario import Scenario
 from shared.topics import ALIVE, Delivery, Topic
-from shared.transport import Inbox, Publish
+from shared.transport import Bus, Inbox, Publish
 
 CLOSE_TIMEOUT_S = 2.0
 """Closing may hang during a partition; after this long the process ends without it."""
 
 _OTHERS = zenoh.Locality.REMOTE
+_ALIVE_PREFIX = ALIVE.split("{", maxsplit=1)[0]
 _log = logging.getLogger("bus")
 _QOS: dict[Delivery, dict[str, Any]] = {
     Delivery.STATE: {
@@ -52,27 +57,30 @@ _QOS: dict[Delivery, dict[str, Any]] = {
 
 
 class ZenohBus:
-    """One process's Zenoh sessions; see `shared.transport.Bus`.
+    """One process's Zenoh session, and the radio that it listens to beside it; see `shared.transport.Bus`.
 
     Args:
-        settings: Configuration of the session that it publishes on, see `shared.net.settings`.
-        ears: Of sessions that it only listens to, as the hand's radio.
+        settings: Configuration of the session, see `shared.net.settings`.
+        radio: Where the hand is on the air: it is subscribed to as well, and closed with the bus.
 
     Raises:
         DeviceError: An endpoint cannot be listened on, or no router answers (later it may vanish and return).
     """
 
-    def __init__(self, settings: Settings, *ears: Settings) -> None:
+    def __init__(self, settings: Settings, radio: Receiver | None = None) -> None:
         self._declared: list[Any] = []
-        self._sessions: list[zenoh.Session] = []
+        self._radio = radio
         self._audit: Audit | None = None
-        for each in (settings, *ears):
-            session = _open(each)
-            self._sessions.append(session)
-            self._declared.append(_let_dead_links_go(session))
+        try:
+            self._session = _open(settings)
+        except DeviceError:
+            if radio:
+                radio.close()
+            raise
+        self._declared.append(_let_dead_links_go(self._session))
 
     def watch_links(self, audit: Audit) -> None:
-        """Tells an audit of every link of the publishing session, and of what Zenoh refuses on it.
+        """Tells an audit of every link, and of what Zenoh refuses on it.
 
         Zenoh's log is set up once per process: call it before anybody else does.
         """
@@ -82,16 +90,17 @@ class ZenohBus:
             identity, name = str(event.link.zid), event.link.auth_identifier
             audit.linked(identity, name, present=event.kind == zenoh.SampleKind.PUT)
 
-        listener = self._sessions[0].info.declare_link_events_listener(changed, history=True)
+        listener = self._session.info.declare_link_events_listener(changed, history=True)
         self._declared.append(listener)
 
     def audit(self) -> dict[str, float]:
         """See `Bus.audit`."""
-        return self._audit.metrics() if self._audit else {}
+        mesh = self._audit.metrics() if self._audit else {}
+        return mesh | self._radio.audit() if self._radio else mesh
 
     def publisher(self, topic: Topic, **parts: object) -> Publish:
         """See `Bus.publisher`."""
-        declared = self._sessions[0].declare_publisher(topic.key(**parts), **_QOS[topic.delivery])
+        declared = self._session.declare_publisher(topic.key(**parts), **_QOS[topic.delivery])
         self._declared.append(declared)
         return declared.put
 
@@ -103,24 +112,26 @@ class ZenohBus:
 
         # On Zenoh's own thread: handing over to a Python thread per subscription would cost a wake-up each.
         handler = zenoh.handlers.Callback(store, indirect=False)
-        for session in self._sessions:
-            subscriber = session.declare_subscriber(key_expression, handler, allowed_origin=_OTHERS)
-            self._declared.append(subscriber)
+        subscriber = self._session.declare_subscriber(key_expression, handler, allowed_origin=_OTHERS)
+        self._declared.append(subscriber)
+        if self._radio:
+            self._radio.subscribe(key_expression, inbox)
 
     def announce(self, role: str, number: int) -> None:
         """See `Bus.announce`."""
-        token = self._sessions[0].liveliness().declare_token(ALIVE.format(role=role, id=number))
+        token = self._session.liveliness().declare_token(ALIVE.format(role=role, id=number))
         self._declared.append(token)
 
     def watch_presence(self, on_change: Callable[[str, bool], None]) -> None:
         """See `Bus.watch_presence`."""
-        prefix = ALIVE.split("{", maxsplit=1)[0]
 
         def changed(sample: zenoh.Sample) -> None:
-            on_change(str(sample.key_expr).removeprefix(prefix), sample.kind == zenoh.SampleKind.PUT)
+            on_change(str(sample.key_expr).removeprefix(_ALIVE_PREFIX), sample.kind == zenoh.SampleKind.PUT)
 
-        watcher = self._sessions[0].liveliness().declare_subscriber(f"{prefix}**", changed, history=True)
+        watcher = self._session.liveliness().declare_subscriber(f"{_ALIVE_PREFIX}**", changed, history=True)
         self._declared.append(watcher)
+        if self._radio:
+            self._radio.watch_presence(on_change)
 
     def close(self) -> None:
         """See `Bus.close`; ends the process if the library does not return."""
@@ -130,8 +141,9 @@ class ZenohBus:
         for declared in self._declared:
             declared.undeclare()
         self._declared.clear()
-        for session in self._sessions:
-            session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        self._session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        if self._radio:
+            self._radio.close()
         watchdog.cancel()
 
     def __enter__(self) -> Self:
@@ -143,7 +155,7 @@ class ZenohBus:
 
 def join(
     scenario: Scenario, formation: Formation, node: str, *, listening: bool = True, audited: bool = False
-) -> ZenohBus:
+) -> Bus:
     """Joins the swarm as one of its nodes.
 
     Args:
@@ -155,17 +167,28 @@ def join(
             is for processes that do not talk to a terminal.
 
     Raises:
-        ConfigError: The profile wants keys that are not there.
-        DeviceError: The endpoint cannot be listened on.
+        ConfigError: The profile wants keys that are not there, or has no group to speak in.
+        DeviceError: The endpoint cannot be listened on, or the radio's interface is not there.
     """
+    if scenario.net.profile == "radio" and node == RELAY:
+        return Transmitter(radio_group(scenario.net), scenario.swarm.name, system_clock())
     settings = node_settings(scenario, formation, node, listening=listening)
     if not (scenario.net.keys and audited):
-        return ZenohBus(*settings)
+        return ZenohBus(settings, _hand_on_air(scenario))
     audit = Audit(Keyring(Path(scenario.net.keys)).members())
     _listen_to_zenoh(audit)
-    bus = ZenohBus(*settings)
+    bus = ZenohBus(settings, _hand_on_air(scenario))
     bus.watch_links(audit)
     return bus
+
+
+def _hand_on_air(scenario: Scenario) -> Receiver | None:
+    """Begins to listen to the relay where its profile puts it on the air, and to nobody else there."""
+    if scenario.net.profile != "radio":
+        return None
+    (token,) = presence(RELAY)
+    speaker = token.removeprefix(_ALIVE_PREFIX)
+    return Receiver(radio_group(scenario.net), scenario.swarm.name, speaker, writes(RELAY), system_clock())
 
 
 def _listen_to_zenoh(audit: Audit) -> None:

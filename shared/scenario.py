@@ -332,9 +332,9 @@ class Net:
             uses the TCP port of that number as well, for all but samples.
         router: Endpoint of a router whose client every node is, instead of linking to each other.
         keys: Directory with the keys of this node (`swarmtouch net keys`); empty: none.
-        multicast: Group of the hand's radio, for example `udp/224.0.0.225:7450`; empty: that one, or a free
+        multicast: Group of the hand's radio, for example `224.0.0.225:7450`; empty: that one, or a free
             port of it for a flight on one machine.
-        interface: Network interface of the radio.
+        interface: Network interface of the radio, for example `wlan0`.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
         full_mesh: Up to this many drones everyone links to everyone; of more, only those who must.
         pointer_port: Loopback UDP port where the relay's `pointer://` source hears consoles; 0: it has none.

@@ -1,6 +1,7 @@
 """What a bus is: publish bytes on keys, receive the newest bytes per key, announce presence.
 
-Backends: `shared.bus` (Zenoh) and `shared.memory_bus` (one process, for simulation and tests).
+Backends: `shared.bus` (Zenoh), `shared.radio` (multicast, from the relay to everybody) and `shared.memory_bus`
+(one process, for simulation and tests).
 """
 
 import contextlib
@@ -93,7 +94,7 @@ class Bus(Protocol):
         """Calls `on_change("role/id", present)` for every process that appears or disappears."""
 
     def audit(self) -> dict[str, float]:
-        """Returns who is linked and how often whom was refused; empty where links carry no names."""
+        """Returns what a status tells of the network: who is linked, and how often what or whom was refused."""
 
     def close(self) -> None:
         """Leaves the swarm; returns in bounded time, may be called twice."""

@@ -4,6 +4,7 @@ import math
 import socket
 import time
 from collections.abc import Iterator
+from contextlib import closing
 
 from deploy.doctor.finding import Finding, bad, good, warning
 from deploy.launcher.ports import free_ports
@@ -15,15 +16,17 @@ from shared.formation import build_formation
 from shared.net.settings import peer_settings
 from shared.nodes import all_nodes
 from shared.pointer_link import LOOPBACK
+from shared.radio import Receiver, Transmitter
+from shared.radio_link import radio_group
 from shared.scenario import Scenario
-from shared.topics import FORMATION_STATE
+from shared.topics import FORMATION_STATE, HAND
 from shared.transport import Inbox, Publish
 
 LINK_S = 5.0
 SLOW_MS = 5.0
 _ROUNDS = 50
 _NS_PER_MS = 1_000_000
-_GROUP, _WAIT_S = "224.0.0.224", 0.5
+_WAIT_S = 0.5
 _SWARM = "doctor"
 
 
@@ -72,26 +75,27 @@ def check_link() -> Finding:
 _BLOCKED = "allow TCP on loopback: look at the firewall, at a VPN or a sandbox"
 
 
-def check_multicast() -> Finding:
-    """Sends one multicast datagram to itself; only the network profile `radio` needs it."""
+def check_multicast(scenario: Scenario) -> Finding:
+    """Says something to itself on the radio's group; only the network profile `radio` needs it."""
+    clock = system_clock()
+    inbox = Inbox(clock)
+    _, (port,) = free_ports(tcp=0, udp=1)
+    group = radio_group(scenario.net)._replace(port=port)
     try:
         with (
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver,
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
+            closing(Receiver(group, _SWARM, _SWARM, [HAND.key()], clock)) as receiver,
+            Transmitter(group, _SWARM, clock) as transmitter,
         ):
-            receiver.bind(("", 0))
-            joined = socket.inet_aton(_GROUP) + socket.inet_aton("0.0.0.0")  # noqa: S104  any interface
-            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, joined)
-            receiver.settimeout(_WAIT_S)
-            sender.sendto(b"doctor", (_GROUP, receiver.getsockname()[1]))
-            receiver.recv(16)
-    except OSError as error:
-        return warning(
-            "multicast",
-            f"does not come through: {error}",
-            "needed for the radio profile only: connect to a network, and allow multicast in the firewall",
-        )
-    return good("multicast", f"comes through on {_GROUP}")
+            receiver.subscribe(HAND.key(), inbox)
+            transmitter.publisher(HAND)(b"")
+            if not inbox.wait(_WAIT_S):
+                return warning("multicast", f"does not come through on {group.interface}", _FOR_RADIO)
+    except DeviceError as error:
+        return warning("multicast", str(error), _FOR_RADIO)
+    return good("multicast", f"comes through on {group.interface} ({group.address})")
+
+
+_FOR_RADIO = "needed for the radio profile only: set net.interface, and allow multicast in the firewall"
 
 
 def _one_way_ms(publish: Publish, inbox: Inbox, clock: Clock) -> float:
@@ -114,4 +118,4 @@ def all_network(scenario: Scenario) -> Iterator[Finding]:
     """Yields every finding about the network."""
     yield check_ports(scenario)
     yield check_link()
-    yield check_multicast()
+    yield check_multicast(scenario)

@@ -11,16 +11,9 @@ from attrs import frozen
 
 from shared.config import vehicle_settings
 from shared.formation import Formation
-from shared.net.settings import RADIO_GROUP
-from shared.nodes import all_nodes, loopback
+from shared.nodes import BRIDGE, CONSOLE, DRONE, OBSERVER, RELAY, WORLD, all_nodes, loopback
+from shared.radio_link import GROUP
 from shared.scenario import Scenario
-
-WORLD = "world"
-DRONE = "drone"
-BRIDGE = "bridge"
-RELAY = "relay"
-OBSERVER = "observer"
-CONSOLE = "console"
 
 
 @frozen(kw_only=True)
@@ -167,7 +160,7 @@ def resolve_scenario(
             scenario.net,
             endpoints={**free, **scenario.net.endpoints},
             # The number is free: on a radio the relay, first of all nodes, listens on no port of its own.
-            multicast=scenario.net.multicast or f"{RADIO_GROUP}:{tcp_ports[0]}",
+            multicast=scenario.net.multicast or f"{GROUP}:{tcp_ports[0]}",
             pointer_port=pointer_port,
         ),
         vehicles=attrs.evolve(scenario.vehicles, all=attrs.evolve(everyone, uri=uri)),

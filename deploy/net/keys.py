@@ -10,9 +10,10 @@ from rich.table import Table
 
 from deploy.net.authority import WARN_DAYS, create, issue, issued, remove
 from shared.config import load_scenario
-from shared.formation import build_formation
+from shared.errors import ConfigError
+from shared.formation import Formation, build_formation
 from shared.net.keyring import Keyring
-from shared.nodes import all_nodes
+from shared.nodes import all_nodes, endpoint
 from shared.scenario import Scenario
 
 
@@ -26,8 +27,9 @@ def run(arguments: argparse.Namespace) -> int:
             f"{keyring.folder}: authority and hand key made; {keyring.authority_key} never leaves this machine"
         )
     elif arguments.action == "issue":
-        for node in arguments.nodes or all_nodes(build_formation(scenario)):
-            issue(keyring, node, (*arguments.host, *_hosts(scenario, node)))
+        formation = build_formation(scenario, arguments.scenario)
+        for node in arguments.nodes or all_nodes(formation):
+            issue(keyring, node, (*arguments.host, *_hosts(scenario, formation, node)))
             print(f"{keyring.certificate(node)}: issued for {node}")
     elif arguments.action == "remove":
         for node in arguments.nodes:
@@ -38,10 +40,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _hosts(scenario: Scenario, node: str) -> tuple[str, ...]:
+def _hosts(scenario: Scenario, formation: Formation, node: str) -> tuple[str, ...]:
     """Returns the host under which the scenario has others dial a node."""
-    address = scenario.net.endpoints.get(node, "")
-    host = urlsplit(f"//{address.partition('/')[2]}").hostname if address else None
+    address = endpoint(scenario, formation, node) if node in all_nodes(formation) else ""
+    try:
+        host = urlsplit(f"//{address.partition('/')[2]}").hostname if address else None
+    except ValueError as error:
+        raise ConfigError(f"net.endpoints.{node}: {address!r}: {error}") from error
     return (host,) if host else ()
 
 

@@ -5,8 +5,8 @@ from collections.abc import Collection, Iterable
 from attrs import frozen
 
 from shared.messages import DroneState, Flag, ProcessStatus
+from shared.nodes import DRONE, RELAY, WORLD
 
-DRONE, RELAY, WORLD = "drone", "relay", "world"
 WELL_STATES = ("running", "starting")
 WORRYING = (
     Flag.BLOCKED | Flag.FENCE | Flag.LOW_BATTERY | Flag.CRITICAL_BATTERY | Flag.OLD_POSE | Flag.HAND_STALE

@@ -2,8 +2,8 @@
 
 The facts behind the settings are measured: links found by gossip never heal after a partition, so every link is
 static; best effort over QUIC with `mixed_rel` keeps 0.5 ms under 20 % loss where TCP needs 30; over UDP a lost
-declaration is never repeated and leaves a node deaf for good, so TCP goes beside it; multicast knows no TLS and
-no access rules, so the radio is a session of its own on which nobody but the relay speaks.
+declaration is never repeated and leaves a node deaf for good, so TCP goes beside it. The hand's radio is not
+Zenoh's: one malformed datagram in the group ends a multicast session of Zenoh for good (`shared.radio`).
 """
 
 from collections.abc import Sequence
@@ -22,9 +22,6 @@ Settings = dict[str, Any]
 LEASE_MS = 1000
 KEEP_ALIVES = 10
 """How often per lease an idle link says so: with four, a datagram link that loses a fifth ends in minutes."""
-RADIO_GROUP, RADIO_PORT = "udp/224.0.0.225", 7450
-JOIN_INTERVAL_MS = 500
-"""How often the radio tells newcomers how to listen: a receiver that starts late waits at most this long."""
 MAX_PUT_BYTES = 16_384
 """Zenoh drops larger ones uncounted; what is over the codec's 4 KiB but under this is counted as oversized."""
 MAX_MESSAGE_BYTES = 65_536
@@ -34,10 +31,8 @@ OPEN_TIMEOUT_MS = 1500
 """Closing waits for every attempt to dial somebody who is not there: less than `bus.CLOSE_TIMEOUT_S`."""
 
 
-def node_settings(
-    scenario: Scenario, formation: Formation, node: str, *, listening: bool = True
-) -> list[Settings]:
-    """Builds the configuration of every Zenoh session of one node.
+def node_settings(scenario: Scenario, formation: Formation, node: str, *, listening: bool = True) -> Settings:
+    """Builds the configuration of one node's Zenoh session.
 
     Args:
         scenario: The scenario; `net` says how.
@@ -45,21 +40,20 @@ def node_settings(
         node: Name of the node (`shared.nodes`).
         listening: False for a node that nobody dials, as any number of observers are.
 
-    Returns:
-        The session that the node publishes on first, then those that it only listens to.
-
     Raises:
-        ConfigError: The profile wants keys that are not there.
+        ConfigError: The profile wants keys that are not there, or the node has no session.
     """
     net = scenario.net
     if net.profile == "radio" and node == RELAY:
-        return [radio_settings(scenario)]
+        raise ConfigError(
+            "net.profile: in radio the relay has no Zenoh session, it sends to net.multicast only"
+        )
     if net.router is not None:
         if net.keys:
             raise ConfigError(
                 "net.router: a router would speak for everybody; with net.keys nodes link directly"
             )
-        return [client_settings(scenario.swarm.name, net.router, adminspace=net.adminspace)]
+        return client_settings(scenario.swarm.name, net.router, adminspace=net.adminspace)
     own, others = endpoint(scenario, formation, node), dials(scenario, formation, node)
     # Who listens in the same place, as the launcher does in an observer's, is heard as well.
     listen, connect = (own, others) if listening else ("", [*others, own])
@@ -70,7 +64,7 @@ def node_settings(
         raise ConfigError("net.keys: profile field needs keys; make them with swarmtouch net keys init")
     elif node == RELAY:
         mesh["access_control"] = deaf(scenario.swarm.name, adminspace=net.adminspace)
-    return [mesh, radio_settings(scenario)] if net.profile == "radio" else [mesh]
+    return mesh
 
 
 def peer_settings(
@@ -136,14 +130,6 @@ def _node(mode: str, listen: Sequence[str], connect: Sequence[str]) -> Settings:
             "shared_memory": {"enabled": False},
         },
     }
-
-
-def radio_settings(scenario: Scenario) -> Settings:
-    """Builds the session on the hand's multicast group: the relay speaks there, everybody else only listens."""
-    group = f"{scenario.net.multicast or f'{RADIO_GROUP}:{RADIO_PORT}'}#iface={scenario.net.interface}"
-    settings = _member(scenario.swarm.name, _node("peer", (group,), ()))
-    settings["transport"]["multicast"] = {"join_interval": JOIN_INTERVAL_MS}
-    return settings
 
 
 def _secure(settings: Settings, keyring: Keyring, swarm: str, node: str) -> None:

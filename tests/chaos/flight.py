@@ -8,14 +8,14 @@ from pathlib import Path
 
 import attrs
 
-from deploy.launcher.process_table import BRIDGE, CONSOLE, ProcessRow
+from deploy.launcher.process_table import ProcessRow
 from deploy.net.authority import create, issue
 from shared.clock import NS_PER_S
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
 from shared.net.keyring import Keyring
-from shared.nodes import OBSERVER, all_nodes
-from shared.scenario import Net, Scenario
+from shared.nodes import BRIDGE, CONSOLE, OBSERVER, all_nodes
+from shared.scenario import Net, Profile, Scenario
 from tests.chaos.lab import Lab
 from tests.integration.recorder import START_S, Recorder
 from tests.integration.swarm import Swarm
@@ -26,6 +26,7 @@ GUEST = "guest"
 """Node of whoever does not belong."""
 OBSERVERS = (f"{OBSERVER}/0", f"{CONSOLE}/0")
 PORT, WORLD_PORT = 7447, 7400
+PROFILES: dict[str, Profile] = {"quic": "field", "radio": "radio"}
 ANYWHERE = "0.0.0.0"  # noqa: S104  in a namespace that nothing outside reaches
 
 
@@ -60,7 +61,8 @@ class ChaosFlight(Swarm):
         scenario: Name of the scenario.
         hand: URI of the hand.
         folder: Where logs go.
-        protocol: `tcp`, `udp` or `quic` between the nodes; `quic` is the profile `field`, with keys.
+        protocol: `tcp`, `udp` or `quic` between the nodes; `quic` is the profile `field`, with keys; `radio` is
+            the same, with the hand on the air.
         routed: Whether everybody is the client of a router.
         overrides: `key=value` items.
     """
@@ -80,7 +82,8 @@ class ChaosFlight(Swarm):
     ) -> None:
         self.lab = lab
         self.folder = folder
-        self._protocol = protocol
+        self._profile = PROFILES.get(protocol, "laptop")
+        self._protocol = "quic" if protocol == "radio" else protocol
         self._keyring = Keyring(folder / "keys")
         self._routed = routed
         super().__init__(scenario, hand, folder, overrides)
@@ -95,7 +98,8 @@ class ChaosFlight(Swarm):
         if keys:
             self._issue_keys(raw.swarm.name, nodes)
         net = Net(
-            profile="field" if keys else "laptop",
+            profile=self._profile,
+            interface="mesh",
             keys=str(self._keyring.folder) if keys else "",
             endpoints={node: self._endpoint(self.lab.mesh(node)) for node in nodes},
             router=self._endpoint(self.lab.mesh(ROUTER)) if self._routed else None,
@@ -110,7 +114,9 @@ class ChaosFlight(Swarm):
         net = self.scenario.net
         endpoints = {node: self._endpoint(self.lab.air(node)) for node in net.endpoints}
         router = self._endpoint(self.lab.air(ROUTER)) if self._routed else None
-        net = attrs.evolve(net, endpoints=endpoints, router=router)
+        # The hand's radio is in the mesh, where the recorder is not.
+        profile: Profile = "field" if self._profile == "radio" else self._profile
+        net = attrs.evolve(net, profile=profile, endpoints=endpoints, router=router)
         return Witness(attrs.evolve(self.scenario, net=net))
 
     def command(self, row: ProcessRow) -> tuple[str, ...]:

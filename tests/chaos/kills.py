@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from deploy.launcher.process_table import CONSOLE
 from shared.clock import NS_PER_S
 from shared.messages import Flag, Mode
-from shared.nodes import OBSERVER
+from shared.nodes import CONSOLE, OBSERVER
 from tests.chaos.flight import OBSERVERS, ROUTER, ChaosFlight, chaos_flight
 from tests.chaos.row import Row, judge
 from tests.chaos.steps import (

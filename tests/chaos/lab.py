@@ -42,9 +42,10 @@ def obstacle() -> str | None:
     return None
 
 
-def _run(*command: str) -> None:
+def _run(*command: str) -> str:
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     assert done.returncode == 0, f"{' '.join(command)}: {done.stderr}"
+    return done.stdout
 
 
 def _sweep() -> None:
@@ -106,12 +107,26 @@ class Lab:
             chance = ("--match", "statistic", "--mode", "random", "--probability", str(probability))
             self._drop(node, "--in-interface", "mesh", *chance)
 
+    def deafen(self, node: str) -> None:
+        """Lets nothing come in at a node, nor go out to it, in the mesh and in the air; it may speak."""
+        self._drop(node)
+        for other in self._number:
+            for address in (self.mesh(node), self.air(node)):
+                if other != node:
+                    self._drop(other, "--destination", address, chain="OUTPUT")
+
+    def taken_in(self, node: str) -> int:
+        """Returns how many IPv4 packets the kernel of a node has handed on to whoever they were for."""
+        table = _run(*self.within(node), "grep", "^Ip:", "/proc/net/snmp")
+        names, values = (line.split() for line in table.splitlines())
+        return int(values[names.index("InDelivers")])
+
     def silence(self, listener: str, speaker: str) -> None:
         """Lets nothing of the speaker reach the listener through the air."""
         self._drop(listener, "--source", self.air(speaker))
 
     def heal(self) -> None:
-        """Undoes `part`, `lose` and `silence`."""
+        """Undoes `part`, `lose`, `deafen` and `silence`."""
         for node in self._number:
             _run(*self.within(node), "iptables", "--flush")
 
@@ -193,8 +208,8 @@ class Lab:
         for node in self._number:
             self._name(node, "mesh", self.mesh(node))
 
-    def _drop(self, node: str, *match: str) -> None:
-        _run(*self.within(node), "iptables", "--append", "INPUT", *match, "--jump", "DROP")
+    def _drop(self, node: str, *match: str, chain: str = "INPUT") -> None:
+        _run(*self.within(node), "iptables", "--append", chain, *match, "--jump", "DROP")
 
 
 def _space(node: str) -> str:

@@ -9,6 +9,7 @@ from tests.chaos.links import (
     silence_vehicle,
 )
 from tests.chaos.processes import fill_disk, freeze, step_clock, talk
+from tests.chaos.radio import simplex
 from tests.chaos.steps import Fly
 
 PLANS: dict[str, Fly] = {
@@ -21,6 +22,7 @@ PLANS: dict[str, Fly] = {
     "kill-console": kill_bystander("console"),
     "kill-router": kill_router,
     "unheard": silence_vehicle,
+    "simplex": simplex,
     "freeze": freeze,
     "part": partition(8.0, "udp"),
     "part-tcp": partition(8.0, "tcp"),

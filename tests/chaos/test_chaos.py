@@ -11,7 +11,7 @@ pytestmark = [pytest.mark.container, pytest.mark.timeout(180)]
 
 
 @pytest.mark.parametrize(
-    "name", ["kill-1", "kill-two", "restart", "kill-router", "freeze", "unheard", "garbage"]
+    "name", ["kill-1", "kill-two", "restart", "kill-router", "freeze", "unheard", "simplex", "garbage"]
 )
 def test_the_swarm_does_as_designed(name: str, tmp_path: Path) -> None:
     if reason := obstacle():

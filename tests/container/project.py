@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 IMAGE = "swarmtouch"
 COMPOSE_FILE = str(ROOT / "deploy/compose.yaml")
 ROUTER_FILE = str(ROOT / "deploy/compose.router.yaml")
+FIELD_FILE = str(ROOT / "deploy/compose.field.yaml")
 PORT = 7447
 
 

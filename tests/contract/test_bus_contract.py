@@ -7,6 +7,7 @@ wait for each sample before they send the next, except where a burst is what the
 import json
 import threading
 import time
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -18,6 +19,8 @@ from shared.bus import ZenohBus, routing
 from shared.errors import DeviceError
 from shared.memory_bus import MemoryBus, MemoryNetwork
 from shared.net.settings import client_settings, peer_settings
+from shared.radio import Receiver, Transmitter
+from shared.radio_link import GROUP, RadioGroup
 from shared.topics import DRONE_STATE, HAND, STATUS
 from shared.transport import Bus, Inbox, Publish
 
@@ -53,9 +56,41 @@ def routed_swarm() -> Iterator[OpenBus]:
         yield lambda: ZenohBus(client_settings("swarm", where))
 
 
-@pytest.fixture(params=[memory_swarm, zenoh_swarm, routed_swarm])
+@contextmanager
+def radio_swarm() -> Iterator[OpenBus]:
+    """The first bus is the relay's, which only speaks; the others have a mesh, and the radio beside it."""
+    group = RadioGroup(GROUP, free_ports(tcp=0, udp=1)[1][0], "lo")
+    swarm = uuid.uuid4().hex
+    opened = 0
+
+    def open_bus() -> Bus:
+        nonlocal opened
+        opened += 1
+        if opened == 1:
+            return Transmitter(group, swarm, time.monotonic_ns)
+        keys = [HAND.key(), *(DRONE_STATE.key(id=i) for i in (1, 2)), STATUS.key(role="drone", id=1)]
+        radio = Receiver(group, swarm, "drone/1", keys, time.monotonic_ns)
+        return ZenohBus(peer_settings(swarm, ""), radio)
+
+    yield open_bus
+
+
+BOTH_WAYS = (memory_swarm, zenoh_swarm, routed_swarm)
+
+
+@pytest.fixture(params=BOTH_WAYS)
 def open_bus(request: pytest.FixtureRequest) -> Iterator[OpenBus]:
     """Opens further buses of one swarm; all are closed at the end."""
+    yield from opening(request)
+
+
+@pytest.fixture(params=[*BOTH_WAYS, radio_swarm])
+def open_one_way(request: pytest.FixtureRequest) -> Iterator[OpenBus]:
+    """Opens one bus that speaks, then those that listen to it; all are closed at the end."""
+    yield from opening(request)
+
+
+def opening(request: pytest.FixtureRequest) -> Iterator[OpenBus]:
     opened: list[Bus] = []
     with request.param() as make:
 
@@ -93,7 +128,12 @@ class Presence:
 
 
 def link(sender: Bus, receiver: Bus, number: int = 1) -> None:
-    """Waits until the sender knows the subscriptions of the receiver: its declarations come in order."""
+    """Waits until the sender knows the subscriptions of the receiver: its declarations come in order.
+
+    A radio knows nobody: it speaks to whoever listens.
+    """
+    if isinstance(sender, Transmitter):
+        return
     presence = Presence(sender)
     receiver.announce("drone", number)
     presence.until_true(lambda: f"drone/{number}" in presence.here)
@@ -126,16 +166,16 @@ def send(publish: Publish, inbox: Inbox, *payloads: bytes) -> list[tuple[str, by
     return found
 
 
-def test_bytes_arrive_exactly(open_bus: OpenBus) -> None:
-    sender, receiver = open_bus(), open_bus()
+def test_bytes_arrive_exactly(open_one_way: OpenBus) -> None:
+    sender, receiver = open_one_way(), open_one_way()
     inbox = inbox_of(receiver, HAND.key())
     link(sender, receiver)
     payloads = [b"", b"\0", bytes(range(256)), *(number.to_bytes(2, "big") for number in range(100))]
     assert send(sender.publisher(HAND), inbox, *payloads) == [(HAND.key(), payload) for payload in payloads]
 
 
-def test_a_burst_arrives_in_order_and_nothing_twice(open_bus: OpenBus) -> None:
-    sender, receiver = open_bus(), open_bus()
+def test_a_burst_arrives_in_order_and_nothing_twice(open_one_way: OpenBus) -> None:
+    sender, receiver = open_one_way(), open_one_way()
     inbox = inbox_of(receiver, HAND.key())
     link(sender, receiver)
     publish = sender.publisher(HAND)
@@ -167,8 +207,8 @@ def test_any_size_arrives_whole(open_bus: OpenBus, size: int) -> None:
     ]
 
 
-def test_each_sample_comes_under_its_concrete_key(open_bus: OpenBus) -> None:
-    sender, receiver = open_bus(), open_bus()
+def test_each_sample_comes_under_its_concrete_key(open_one_way: OpenBus) -> None:
+    sender, receiver = open_one_way(), open_one_way()
     inbox = inbox_of(receiver, DRONE_STATE.wildcard)
     link(sender, receiver)
     one, two = sender.publisher(DRONE_STATE, id=1), sender.publisher(DRONE_STATE, id=2)
@@ -177,8 +217,8 @@ def test_each_sample_comes_under_its_concrete_key(open_bus: OpenBus) -> None:
     assert found == [("drone/1/state", b"1"), ("drone/2/state", b"2"), ("drone/1/state", b"3")]
 
 
-def test_a_star_is_one_chunk(open_bus: OpenBus) -> None:
-    sender, receiver = open_bus(), open_bus()
+def test_a_star_is_one_chunk(open_one_way: OpenBus) -> None:
+    sender, receiver = open_one_way(), open_one_way()
     inbox = inbox_of(receiver, "*/*", STATUS.wildcard)
     link(sender, receiver)
     sender.publisher(DRONE_STATE, id=1)(b"three chunks, but not status/*/*")
@@ -202,19 +242,19 @@ def test_everybody_else_hears_and_one_does_not_hear_oneself(open_bus: OpenBus) -
     assert collect(own, 2) == {HAND.key(): [b"another", b"another"]}
 
 
-def test_a_late_subscriber_hears_what_comes_after_it(open_bus: OpenBus) -> None:
-    sender = open_bus()
+def test_a_late_subscriber_hears_what_comes_after_it(open_one_way: OpenBus) -> None:
+    sender = open_one_way()
     publish = sender.publisher(HAND)
     publish(b"before")
-    receiver = open_bus()
+    receiver = open_one_way()
     inbox = inbox_of(receiver, HAND.key())
     link(sender, receiver)
     publish(b"after")
     assert collect(inbox, 1) == {HAND.key(): [b"after"]}
 
 
-def test_publishing_needs_nobody_to_listen(open_bus: OpenBus) -> None:
-    publish = open_bus().publisher(HAND)
+def test_publishing_needs_nobody_to_listen(open_one_way: OpenBus) -> None:
+    publish = open_one_way().publisher(HAND)
     for _ in range(1_000):
         publish(b"anybody?")
 

@@ -63,7 +63,10 @@ def test_a_link_that_cannot_be_is_bad(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_multicast_comes_through_or_says_what_needs_it() -> None:
-    assert len(verdicts([network.check_multicast()])) == 1
+    assert len(verdicts([network.check_multicast(load_scenario("rhombus"))])) == 1
+    absent = network.check_multicast(load_scenario("rhombus", ["net.interface=absent0"]))
+    assert absent.verdict is Verdict.WARNING
+    assert "set net.interface" in absent.found
 
 
 def test_serial_devices_and_their_permissions(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,6 +44,7 @@ PURE = [
             "messages",
             "nodes",
             "pointer_link",
+            "radio_link",
             "scenario",
             "shapes",
             "topics",

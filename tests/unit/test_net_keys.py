@@ -86,3 +86,14 @@ def test_the_command_makes_issues_shows_and_removes(tmp_path: Path, capsys: pyte
     assert "drone/2" in shown
     assert "drone/3" not in shown
     assert main(["net", "keys", "init", "rhombus", *where]) == 2
+
+
+def test_certificates_name_the_hosts_under_which_the_scenario_has_nodes_dialled(tmp_path: Path) -> None:
+    where = ["--keys", str(tmp_path / "keys"), "--set", "net.endpoint=quic/{node}.mesh:7447?mixed_rel=1"]
+    assert main(["net", "keys", "init", "rhombus", *where]) == 0
+    relay = ["--set", "net.endpoints.relay=quic/relay.hand:7447"]
+    assert main(["net", "keys", "issue", "rhombus", *where, *relay]) == 0
+    hosts = {
+        each.name: set(each.hosts) - {"localhost", "127.0.0.1"} for each in issued(Keyring(tmp_path / "keys"))
+    }
+    assert (hosts["drone/2"], hosts["relay"]) == ({"drone-2.mesh"}, {"relay.hand"})

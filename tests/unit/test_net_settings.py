@@ -17,6 +17,7 @@ from shared.net.access import access_control, writes
 from shared.net.keyring import Keyring
 from shared.net.settings import Settings, node_settings
 from shared.nodes import all_nodes
+from shared.radio_link import radio_group
 from shared.scenario import Scenario
 from shared.topics import DRONE_STATE, HAND, TOPICS
 
@@ -72,7 +73,7 @@ def test_every_topic_has_somebody_who_may_write_it() -> None:
 
 
 def test_the_field_has_certificates_rules_and_guards(field: Scenario) -> None:
-    (settings,) = node_settings(field, RHOMBUS, "drone/2")
+    settings = node_settings(field, RHOMBUS, "drone/2")
     tls = settings["transport"]["link"]["tls"]
     assert tls["enable_mtls"]
     assert tls["verify_name_on_connect"]
@@ -84,11 +85,11 @@ def test_the_field_has_certificates_rules_and_guards(field: Scenario) -> None:
 
 def test_beside_an_endpoint_of_datagrams_stands_one_of_tcp() -> None:
     scenario = load_scenario("rhombus", ["net.endpoint=udp/{node}.local:7447"])
-    (settings,) = node_settings(scenario, RHOMBUS, "drone/1")
+    settings = node_settings(scenario, RHOMBUS, "drone/1")
     assert settings["listen"]["endpoints"] == ["tcp/drone-1.local:7447?rel=1", "udp/drone-1.local:7447?rel=0"]
     assert settings["connect"]["endpoints"] == ["tcp/relay.local:7447?rel=1", "udp/relay.local:7447?rel=0"]
     assert settings["transport"]["unicast"]["max_links"] == 2
-    (plain,) = node_settings(load_scenario("rhombus"), RHOMBUS, "drone/1")
+    plain = node_settings(load_scenario("rhombus"), RHOMBUS, "drone/1")
     assert "max_links" not in plain["transport"]["unicast"]
 
 
@@ -110,27 +111,24 @@ def test_a_node_without_its_key_is_told_where_to_get_it(field: Scenario, tmp_pat
 @pytest.mark.parametrize("node", NODES)
 def test_the_relay_takes_no_sample_in_any_profile(field: Scenario, node: str) -> None:
     for scenario in (load_scenario("rhombus"), load_scenario("rhombus", ["net.profile=compose"]), field):
-        rules = node_settings(scenario, RHOMBUS, "relay")[0]["access_control"]
+        rules = node_settings(scenario, RHOMBUS, "relay")["access_control"]
         for message in ("put", "delete", "query", "reply", "liveliness_token", "declare_queryable"):
             assert granted(rules, node, message) == set()
 
 
-def test_on_the_radio_the_relay_has_no_other_link_and_nobody_else_speaks_there() -> None:
-    radio = load_scenario("rhombus", ["net.profile=radio", "net.interface=wlan0"])
-    (relay,) = node_settings(radio, RHOMBUS, "relay")
-    assert relay["listen"]["endpoints"] == ["udp/224.0.0.225:7450#iface=wlan0"]
-    assert relay["connect"]["endpoints"] == []
-    mesh, ear = node_settings(radio, RHOMBUS, "drone/2")
+def test_on_the_radio_the_relay_has_no_session_and_nobody_dials_it() -> None:
+    radio = load_scenario("rhombus", ["net.profile=radio"])
+    with pytest.raises(ConfigError, match="the relay has no Zenoh session"):
+        node_settings(radio, RHOMBUS, "relay")
+    mesh = node_settings(radio, RHOMBUS, "drone/2")
     assert mesh["listen"]["endpoints"] == ["tcp/127.0.0.1:7462"]
     assert mesh["connect"]["endpoints"] == ["tcp/127.0.0.1:7461"]
-    assert ear["listen"] == relay["listen"]
-    assert ear["connect"]["endpoints"] == []
 
 
 def test_the_command_writes_what_the_process_uses(field: Scenario, capsys: pytest.CaptureFixture[str]) -> None:
     keys = f"net.keys={field.net.keys}"
     assert main(["net", "config", "rhombus", "--profile", "field", "--node", "drone/2", "--set", keys]) == 0
-    assert json.loads(capsys.readouterr().out) == node_settings(field, RHOMBUS, "drone/2")[0]
+    assert json.loads(capsys.readouterr().out) == node_settings(field, RHOMBUS, "drone/2")
     assert main(["net", "config", "rhombus", "--node", "drone/9"]) == 2
 
 
@@ -151,6 +149,7 @@ def test_no_input_of_a_profile_does_more_than_be_refused(
     try:
         scenario = load_scenario("rhombus", [*overrides, f"net.keys={field.net.keys}"])
         settings = node_settings(scenario, RHOMBUS, "drone/2")
+        radio_group(scenario.net)
     except SwarmTouchError:
         return
     assert json.loads(json.dumps(settings)) == settings
