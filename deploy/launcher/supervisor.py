@@ -14,8 +14,9 @@ from pathlib import Path
 
 from attrs import define, field
 
-from deploy.launcher.process_table import CONSOLE, ProcessRow
+from deploy.launcher.process_table import ProcessRow
 from observer.console.arguments import TOKEN_VARIABLE
+from shared.nodes import CONSOLE
 from shared.process import EXIT_REFUSED, LAUNCHER_PID
 
 FIRST_BACKOFF_S = 0.25
