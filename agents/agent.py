@@ -12,7 +12,7 @@ from agents.stepping import due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
 from shared.formation import Formation
-from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard
+from shared.messages import NO_HAND, DroneState, HandSample, Heard
 from shared.net.keyring import hand_verifier
 from shared.nodes import neighbours
 from shared.scenario import Scenario
@@ -137,6 +137,7 @@ class Agent:
 
     def _inputs(self, now_ns: int, pose: Pose, pose_age: float) -> Inputs:
         hand = self.senses.hand
+        drones, silent = _around(self.senses.drones.values(), now_ns)
         return Inputs(
             position=pose.position,
             velocity=pose.velocity,
@@ -146,9 +147,9 @@ class Agent:
             wish=None if hand is None else hand.message.mode,
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
-            references=tuple(self._reference(other, key, now_ns) for other, key in self._kin.items()),
-            drones=_encounters(self.senses.drones.values(), now_ns),
-            silent=_bystanders(self.senses.drones.values(), now_ns),
+            references=tuple([self._reference(other, key, now_ns) for other, key in self._kin.items()]),
+            drones=drones,
+            silent=silent,
         )
 
     def _reference(self, other: int, key: str, now_ns: int) -> Reference | None:
@@ -168,7 +169,7 @@ class Agent:
     def _heard(self) -> dict[str, Heard]:
         """Returns what this step used: the hand, the references, and who stands behind one that is gone."""
         heard = {} if self.senses.hand is None else {HAND_KEY: self.senses.hand.heard}
-        repaired = self._state is not None and any(each.share > 0.0 for each in self._state.stand_ins)
+        repaired = self._state is not None and any(each.share for each in self._state.stand_ins)
         for other, key in (self._kin if repaired else self._references).items():
             if other in self.senses.drones:
                 heard[key] = self.senses.drones[other].heard
@@ -191,25 +192,20 @@ def hand_input(sample: HandSample) -> HandInput:
     )
 
 
-def _bystanders(drones: Iterable[Sensed[DroneState]], now_ns: int) -> list[Bystander]:
-    """Returns who has fallen silent: a body that may drift or fall, for as long as it may be in the air."""
-    found = []
+def _around(drones: Iterable[Sensed[DroneState]], now_ns: int) -> tuple[list[Encounter], list[Bystander]]:
+    """Returns where the other drones are, and who of them has fallen silent.
+
+    One that is silent stays there for as long as its body may be in the air, and may drift or fall, but comes
+    no closer.
+    """
+    encounters, silent = [], []
     for sensed in drones:
         age = sensed.age(now_ns)
-        if SILENT_AFTER < age <= FORGOTTEN_AFTER:
-            x, y, _ = sensed.message.position
-            radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
-            found.append(Bystander(x, y, radius))
-    return found
-
-
-def _encounters(drones: Iterable[Sensed[DroneState]], now_ns: int) -> list[Encounter]:
-    """Returns where the other drones are; a silent one stays there for a while, but comes no closer."""
-    found = []
-    for sensed in drones:
-        if sensed.age(now_ns) > FORGOTTEN_AFTER:
+        if age > FORGOTTEN_AFTER:
             continue
-        x, y, _ = sensed.message.position
-        u, v, _ = sensed.message.velocity if sensed.age(now_ns) <= DRONE_STATE.stale_s else ORIGIN
-        found.append((x, y, u, v))
-    return found
+        (x, y, _), (u, v, _) = sensed.message.position, sensed.message.velocity
+        encounters.append((x, y, u, v) if age <= DRONE_STATE.stale_s else (x, y, 0.0, 0.0))
+        if age > SILENT_AFTER:
+            radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
+            silent.append(Bystander(x, y, radius))
+    return encounters, silent

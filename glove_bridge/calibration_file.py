@@ -1,6 +1,5 @@
 """Reads and writes calibrations: TOML, refused with file, key and a hint when they are wrong."""
 
-import tomllib
 from pathlib import Path
 
 import tomli_w
@@ -9,6 +8,7 @@ from attrs import asdict
 from glove_bridge.calibration import Calibration
 from shared.config import structure
 from shared.errors import ConfigError
+from shared.toml_text import read_toml
 
 SHIPPED = Path(__file__).resolve().parent / "coin-motors.toml"
 """Typical values, so that a glove vibrates before it is calibrated."""
@@ -24,12 +24,7 @@ def load_calibration(source: str | Path | None = None) -> Calibration:
         ConfigError: What is wrong, with file, key and a hint.
     """
     path = Path(source) if source else SHIPPED
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: no calibration: {error}; make one: swarmtouch glove calibrate") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    tree = read_toml(path, "make a calibration: swarmtouch glove calibrate")
     return structure(tree, Calibration, str(path))
 
 

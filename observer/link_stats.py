@@ -15,9 +15,8 @@ from attrs import frozen
 from observer.histogram import Histogram, Quantiles
 from shared.clock import NS_PER_S
 from shared.messages import DroneState, FormationState, Heard, Message, ProcessStatus
+from shared.nodes import OBSERVER
 from shared.topics import rank
-
-OBSERVER = "observer"
 
 _REMEMBERED = 1024
 """Recent samples of a key whose stamps are known, and recent gaps that a late sample may still fill."""

@@ -24,6 +24,7 @@ from shared.formation import Formation
 from shared.net.access import presence, writes
 from shared.net.audit import LOG_FILTER, Audit
 from shared.net.keyring import Keyring
+from shared.net.linger import stop_lingering
 from shared.net.log_tap import tap_stdout
 from shared.net.settings import Settings, node_settings, router_settings
 from shared.nodes import RELAY
@@ -76,6 +77,7 @@ class ZenohBus:
             if radio:
                 radio.close()
             raise
+        self._declared.append(_let_dead_links_go(self._session))
 
     def watch_links(self, audit: Audit) -> None:
         """Tells an audit of every link, and of what Zenoh refuses on it.
@@ -212,10 +214,12 @@ def routing(listen: str) -> Iterator[None]:
         DeviceError: The endpoint cannot be listened on.
     """
     session = _open(router_settings(listen))
+    watching = _let_dead_links_go(session)
     try:
         yield
     finally:
-        session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        watching.undeclare()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        session.close()  # type: ignore[no-untyped-call]  # as above
 
 
 def _open(settings: Settings) -> zenoh.Session:
@@ -228,6 +232,15 @@ def _open(settings: Settings) -> zenoh.Session:
         raise DeviceError(
             f"cannot open the bus at {where}: {error}. Is the port in use? Set net.endpoints or net.base_port"
         ) from error
+
+
+def _let_dead_links_go(session: zenoh.Session) -> "zenoh.LinkEventsListener[None]":
+    def changed(event: zenoh.LinkEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT:
+            stop_lingering()
+
+    handler = zenoh.handlers.Callback(changed, indirect=False)
+    return session.info.declare_link_events_listener(handler, history=True)
 
 
 def _give_up() -> None:

@@ -173,9 +173,8 @@ def _ranged_hook(annotated: Any) -> Hook:
 def _heard(value: Any, _: Any) -> Heard:
     if type(value) is not tuple or len(value) != 3:
         raise DecodeError("wrong-type", f"(epoch, seq, arrival) is expected, not {value!r:.40}")
-    for number in value:
-        _unsigned(number, int)
-    return Heard._make(value)
+    epoch, seq, arrival_ns = value
+    return Heard(_unsigned(epoch, int), _unsigned(seq, int), _unsigned(arrival_ns, int))
 
 
 def _sequence_hook(kind: Any) -> Hook:

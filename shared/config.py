@@ -4,9 +4,9 @@ Unknown keys, wrong types and impossible values are refused before anything star
 The formation's own consistency (cycles, depth, distances) is checked by `shared.formation`.
 """
 
+import contextlib
 import difflib
 import math
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
@@ -19,6 +19,7 @@ from cattrs.gen import make_dict_structure_fn
 
 from shared.errors import ConfigError
 from shared.scenario import Scenario, VehicleSettings
+from shared.toml_text import parse_toml, read_toml
 
 T = TypeVar("T")
 
@@ -39,10 +40,7 @@ def load_scenario(source: str | Path, overrides: Sequence[str] = ()) -> Scenario
         ConfigError: What is wrong, with file, key and a hint.
     """
     path = find_scenario(source)
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    tree = read_toml(path)
     for item in overrides:
         _apply_override(tree, item)
     return structure_scenario(tree, str(path))
@@ -55,8 +53,9 @@ def find_scenario(source: str | Path) -> Path:
         ConfigError: There is none; the message lists those that ship.
     """
     for path in (Path(source), SCENARIOS / f"{source}.toml"):
-        if path.is_file():
-            return path
+        with contextlib.suppress(OSError):  # a name that is too long for any file
+            if path.is_file():
+                return path
     shipped = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
     close = difflib.get_close_matches(str(source), shipped, 1)
     hint = f"did you mean {close[0]!r}?" if close else f"scenarios that ship: {', '.join(shipped)}"
@@ -130,8 +129,8 @@ def _apply_override(tree: dict[str, Any], item: str) -> None:
     if not separator or not key.strip():
         raise ConfigError(f"--set {item}: expected key=value, for example --set formation.n=8")
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = parse_toml(f"value = {text}", item)["value"]
+    except ConfigError:
         value = text
     *parents, last = (chunk.strip().strip("\"'") for chunk in key.split("."))
     node = tree

@@ -2,7 +2,6 @@
 
 import csv
 import gzip
-import math
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,13 +14,16 @@ from shared.errors import ConfigError
 Vec = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
 
+LARGEST = 4e9
+"""Size of the largest number: times in s up to it, until 2096, are 64 bits of ns apart at most."""
+
 
 def read_table(path: Path, *, integers: Sequence[str] = (), numbers: Sequence[str] = ()) -> tuple[Stamps, Vec]:
     """Reads named columns of a CSV file with a header; other columns are ignored.
 
     Args:
         path: The file; `.gz` is unpacked on the way.
-        integers: Columns of whole numbers (nanosecond stamps lose digits as floats).
+        integers: Columns of nanosecond stamps, whole numbers (they lose digits as floats).
         numbers: Columns of finite numbers.
 
     Returns:
@@ -45,8 +47,8 @@ def read_table(path: Path, *, integers: Sequence[str] = (), numbers: Sequence[st
     whole, real = [], []
     for line, row in enumerate(rows, start=2):
         try:
-            whole.append([int(row[column]) for column in whole_columns])
-            real.append([_finite(row[column]) for column in number_columns])
+            whole.append([_stamp(row[column]) for column in whole_columns])
+            real.append([_number(row[column]) for column in number_columns])
         except (ValueError, IndexError) as error:
             raise ConfigError(
                 f"{path}: row {line}: {error}; expected numbers for {','.join(wanted)}"
@@ -73,8 +75,15 @@ def read_rows(path: Path) -> list[list[str]]:
     return rows
 
 
-def _finite(text: str) -> float:
+def _stamp(text: str) -> int:
+    stamp = int(text)
+    if not 0 <= stamp < 2**63:
+        raise ValueError(f"{text!r} is no time in ns")
+    return stamp
+
+
+def _number(text: str) -> float:
     number = float(text)
-    if not math.isfinite(number):
-        raise ValueError(f"{text!r} is not finite")
+    if not abs(number) <= LARGEST:
+        raise ValueError(f"{text!r} is not finite or larger than {LARGEST:g}")
     return number

@@ -6,14 +6,13 @@ nanoseconds since the epoch, quaternions x, y, z, w, world frame z up.
 """
 
 import json
-import math
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from attrs import frozen
 
-from shared.csv_table import Stamps, Vec, read_rows, read_table
+from shared.csv_table import LARGEST, Stamps, Vec, read_rows, read_table
 from shared.errors import ConfigError
 from shared.scenario import Obstacle, Pair
 
@@ -110,13 +109,9 @@ def read_patterns(folder: Path) -> tuple[tuple[int, str], ...]:
     path = folder / PATTERN_FILE
     if not path.is_file():
         return ()
-    header, *rows = read_rows(path)
-    if "name" not in header:
-        raise ConfigError(f"{path}: no column name; expected the header t_bag_ns,name")
     stamps, _ = read_table(path, integers=("t_bag_ns",))
-    names = (row[header.index("name")] for row in rows)
     # A row without a name is a tick of the original loop at which nothing was played.
-    return tuple((t, name) for t, name in zip(stamps[:, 0].tolist(), names, strict=True) if name)
+    return tuple((t, name) for t, name in zip(stamps[:, 0].tolist(), _names(path), strict=True) if name)
 
 
 def read_obstacles(folder: Path) -> tuple[Obstacle, ...]:
@@ -127,11 +122,9 @@ def read_obstacles(folder: Path) -> tuple[Obstacle, ...]:
     """
     path = folder / "obstacles.csv"
     _, places = read_table(path, numbers=("median_x", "median_y"))
-    header, *rows = read_rows(path)
-    if "name" not in header:
-        raise ConfigError(f"{path}: no column name; expected the header name,median_x,median_y")
-    names = (row[header.index("name")] for row in rows)
-    return tuple(Obstacle(name=name, x=x, y=y) for name, (x, y) in zip(names, places.tolist(), strict=True))
+    return tuple(
+        Obstacle(name=name, x=x, y=y) for name, (x, y) in zip(_names(path), places.tolist(), strict=True)
+    )
 
 
 def read_meta(folder: Path) -> Meta:
@@ -143,7 +136,7 @@ def read_meta(folder: Path) -> Meta:
     path = folder / "meta.json"
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path.absolute()}: cannot be read as JSON: {error}") from error
     if not isinstance(tree, dict):
         raise ConfigError(f"{path}: an object is expected, not {type(tree).__name__}")
@@ -175,10 +168,22 @@ def check_increasing(path: Path, t: Stamps) -> Stamps:
     return t
 
 
+def _names(path: Path) -> list[str]:
+    """Reads the column `name`."""
+    header, *rows = read_rows(path)
+    if "name" not in header:
+        raise ConfigError(f"{path}: no column name, found the header {','.join(header)}")
+    column = header.index("name")
+    for line, row in enumerate(rows, start=2):
+        if len(row) <= column:
+            raise ConfigError(f"{path}: row {line}: no name")
+    return [row[column] for row in rows]
+
+
 def _numbers(path: Path, tree: dict[str, object], key: str, count: int) -> list[float]:
     value = tree.get(key)
     values = value if isinstance(value, list) else [value]
-    numbers = [float(v) for v in values if isinstance(v, int | float) and math.isfinite(v)]
+    numbers = [float(v) for v in values if isinstance(v, int | float) and abs(v) <= LARGEST]
     if not len(numbers) == len(values) == count:
         expected = "a number" if count == 1 else f"{count} numbers"
         raise ConfigError(f"{path}: at key {key}: {expected} expected, not {value!r}")

@@ -9,9 +9,11 @@ from shared.formation import Formation
 from shared.scenario import Net, Scenario
 
 RELAY = "relay"
+DRONE = "drone"
 WORLD = "world"
 BRIDGE = "bridge"
 OBSERVER = "observer"
+CONSOLE = "console"
 
 NEAR = 1.5
 """Drones that rest within this distance link to each other, m."""
@@ -19,7 +21,7 @@ NEAR = 1.5
 
 def drone_node(drone: int) -> str:
     """Returns the node name of a drone."""
-    return f"drone/{drone}"
+    return f"{DRONE}/{drone}"
 
 
 def all_nodes(formation: Formation) -> tuple[str, ...]:

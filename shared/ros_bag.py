@@ -68,7 +68,7 @@ def read_bag_tracks(path: Path) -> dict[str, BagTrack]:
 def _read(path: Path, kind: str, topic: str | None = None) -> Iterator[tuple[str, _Row]]:
     """Yields the rows of one topic, or of every topic of a type, in the order of arrival."""
     try:
-        from rosbags.rosbag1 import Reader, ReaderError  # noqa: PLC0415  an optional extra
+        from rosbags.rosbag1 import Reader  # noqa: PLC0415  an optional extra
         from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
     except ImportError as error:
         raise ConfigError(
@@ -85,7 +85,9 @@ def _read(path: Path, kind: str, topic: str | None = None) -> Iterator[tuple[str
             # An empty choice would mean every connection to the reader.
             for connection, arrival_ns, raw in reader.messages(connections=chosen) if chosen else ():
                 yield connection.topic, _row(types.deserialize_ros1(raw, kind), arrival_ns)
-    except ReaderError as error:
+    except ConfigError:
+        raise
+    except Exception as error:  # the package checks the frame of a bag, not what its records say
         raise ConfigError(f"{path.absolute()}: not a readable ROS 1 bag: {error}") from error
 
 

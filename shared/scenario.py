@@ -328,7 +328,8 @@ class Net:
         base_port: First port on loopback of nodes without an endpoint.
         endpoint: Endpoint of nodes without an entry in `endpoints`, `{node}` is replaced by the name of the
             node with a dash; for example `tcp/{node}.swarm:7447`, where names resolve.
-        endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "tcp/10.0.0.2:7447"`.
+        endpoints: Node -> Zenoh endpoint, for example `"drone/2" = "udp/10.0.0.2:7447"`; a node at `udp/`
+            uses the TCP port of that number as well, for all but samples.
         router: Endpoint of a router whose client every node is, instead of linking to each other.
         keys: Directory with the keys of this node (`swarmtouch net keys`); empty: none.
         multicast: Group of the hand's radio, for example `224.0.0.225:7450`; empty: that one, or a free

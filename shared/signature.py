@@ -41,10 +41,7 @@ def sign_with(private: Path) -> Sign:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415
     from cryptography.hazmat.primitives.serialization import load_pem_private_key  # noqa: PLC0415
 
-    try:
-        key = load_pem_private_key(private.read_bytes(), password=None)
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"{private}: no key to sign the hand with ({error})") from error
+    key = _read_key(private, lambda pem: load_pem_private_key(pem, password=None))
     if not isinstance(key, Ed25519PrivateKey):
         raise ConfigError(f"{private}: not an Ed25519 key; make one with swarmtouch net keys init")
 
@@ -71,10 +68,7 @@ def verify_with(public: Path) -> Verify:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey  # noqa: PLC0415
     from cryptography.hazmat.primitives.serialization import load_pem_public_key  # noqa: PLC0415
 
-    try:
-        key = load_pem_public_key(public.read_bytes())
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"{public}: no key to check the hand with ({error})") from error
+    key = _read_key(public, load_pem_public_key)
     if not isinstance(key, Ed25519PublicKey):
         raise ConfigError(f"{public}: not an Ed25519 key; copy hand.pub from where the keys were made")
 
@@ -88,3 +82,12 @@ def verify_with(public: Path) -> Verify:
             raise DecodeError("bad-signature", "a hand sample signed by somebody else, or altered") from None
 
     return verify
+
+
+def _read_key(file: Path, load: Callable[[bytes], object]) -> object:
+    from cryptography.exceptions import UnsupportedAlgorithm  # noqa: PLC0415
+
+    try:
+        return load(file.read_bytes())
+    except (OSError, ValueError, TypeError, UnsupportedAlgorithm) as error:  # TypeError: a password
+        raise ConfigError(f"{file}: no readable key of the hand ({error})") from error

@@ -67,6 +67,10 @@ ALIVE = "alive/{role}/{id}"
 """Key of a process's liveliness token."""
 
 
+_DIGITS = 9
+"""Longer numbers are none of ours; anybody may send them."""
+
+
 def matches(expression: str, key: str) -> bool:
     """Says whether a key expression (`*` is one chunk) covers a key."""
     pattern, chunks = expression.split("/"), key.split("/")
@@ -76,7 +80,10 @@ def matches(expression: str, key: str) -> bool:
 def rank(key: str) -> tuple[int, tuple[tuple[int, str], ...]]:
     """Sorts keys for people: in the order of the table, numbers as numbers, what is in no row last."""
     row = next((n for n, topic in enumerate(TOPICS) if matches(topic.wildcard, key)), len(TOPICS))
-    return row, tuple((int(chunk), "") if chunk.isdecimal() else (0, chunk) for chunk in key.split("/"))
+    return row, tuple(
+        (int(chunk), "") if chunk.isdecimal() and len(chunk) <= _DIGITS else (0, chunk)
+        for chunk in key.split("/")
+    )
 
 
 def topic_of(key: str) -> Topic:

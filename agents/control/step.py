@@ -170,7 +170,7 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
     flags = _flags(inputs, settings, usable=usable, fenced=steered.fenced, avoiding=steered.avoiding)
     if blocked_for > BLOCKED_TIME:
         flags |= Flag.BLOCKED
-    if any(stand_in.share > 0.0 for stand_in in stand_ins[: len(settings.row.weights) - 1]):
+    if any(stand_in.share for stand_in in stand_ins[: len(settings.row.weights) - 1]):
         flags |= Flag.REPAIRED
     after = State(mode, hand, links, steered.trajectory, anchor, blocked_for, stand_ins)
     return after, Output(goal, goal_velocity, steered.setpoint, flags)

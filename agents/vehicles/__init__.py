@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from importlib import import_module
-from urllib.parse import urlsplit
 
 from agents.vehicles.base import Vehicle
 from shared.errors import ConfigError
@@ -22,7 +21,7 @@ def open_vehicle(uri: str) -> Vehicle:
     Raises:
         ConfigError: An unknown scheme, or a URI that its backend cannot read.
     """
-    scheme = urlsplit(uri).scheme
+    scheme = uri.partition("://")[0]
     if scheme not in BACKENDS:
         raise ConfigError(
             f"vehicle {uri!r}: no backend for {scheme!r}; known: {', '.join(f'{s}://' for s in BACKENDS)}"

@@ -1,5 +1,6 @@
 """Driver of a simulated vehicle: `sim://host:port/id` talks to the world process."""
 
+import re
 import socket
 import time
 from collections import Counter
@@ -13,6 +14,9 @@ from shared.messages import ORIGIN, Vector
 
 HELLO_PERIOD_S = 0.25
 """After this long without a command `pose` says hello, so either side may start late or come back."""
+
+
+_DRONE = re.compile(r"/([0-9]{1,5})")
 
 
 class SimVehicle:
@@ -107,12 +111,11 @@ def parse_uri(uri: str) -> tuple[str, int, int]:
     Raises:
         ConfigError: The URI is not of that form.
     """
-    parts = urlsplit(uri)
-    drone = parts.path.removeprefix("/")
     try:
-        port = parts.port
+        parts = urlsplit(uri)
+        host, port, drone = parts.hostname, parts.port, _DRONE.fullmatch(parts.path)
     except ValueError:
-        port = None
-    if not parts.hostname or not port or not drone.isdecimal():
+        host = port = drone = None
+    if not (host and port and drone):
         raise ConfigError(f"vehicle {uri!r}: expected sim://host:port/id, for example sim://127.0.0.1:7400/2")
-    return parts.hostname, port, int(drone)
+    return host, port, int(drone[1])

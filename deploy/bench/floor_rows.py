@@ -4,10 +4,9 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from deploy.bench.hop import HAND_ID
-from deploy.launcher.process_table import DRONE, RELAY, ProcessRow
+from deploy.launcher.process_table import ProcessRow
 from shared.formation import Formation
-from shared.nodes import RELAY as RELAY_NODE
-from shared.nodes import dials, drone_node, endpoint, neighbours
+from shared.nodes import DRONE, RELAY, dials, drone_node, endpoint, neighbours
 from shared.scenario import Scenario
 from shared.topics import DRONE_STATE, HAND
 
@@ -22,7 +21,7 @@ def zenoh_rows(scenario: Scenario, formation: Formation, sizes: Mapping[int, int
     """
 
     def row(node: int) -> ProcessRow:
-        name = RELAY_NODE if node == HAND_ID else drone_node(node)
+        name = RELAY if node == HAND_ID else drone_node(node)
         heard = [] if node == HAND_ID else [HAND.key(), *_state_keys(scenario, formation, node)]
         return _row(
             "deploy.bench.floor_zenoh",

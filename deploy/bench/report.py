@@ -38,7 +38,7 @@ class Report:
     """The result of one `swarmtouch bench` command.
 
     Attributes:
-        name: `chain`, `step`, `scale`, `lockstep` or `start`.
+        name: `chain`, `step`, `scale`, `lockstep`, `record` or `start`.
         records: One JSON object per line of output.
         sheets: The same for people.
         draw: Draws it into the axes of a `matplotlib` figure.

@@ -15,11 +15,10 @@ from deploy.bench.flight_ear import FlightEar
 from deploy.bench.floor_ear import FloorEar
 from deploy.bench.report import Json, Report, Sheet
 from deploy.bench.swarm import Phase, fly, fly_bare_zenoh
-from deploy.launcher.process_table import DRONE
 from observer.agent_log import AgentSummary
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
-from shared.nodes import neighbours
+from shared.nodes import DRONE, neighbours
 from shared.scenario import Scenario
 
 

@@ -15,14 +15,14 @@ from deploy.bench.floor_ear import FloorEar, UdpEar, ZenohEar
 from deploy.bench.floor_rows import udp_rows, zenoh_rows
 from deploy.bench.usage import Usage, read_usage
 from deploy.launcher.ports import free_ports
-from deploy.launcher.process_table import RELAY, ProcessRow, process_table, resolve_scenario
+from deploy.launcher.process_table import ProcessRow, process_table, resolve_scenario
 from deploy.launcher.supervisor import Child, Supervisor
 from observer.swarm import SCENARIO_FILE
 from shared.bus import join
 from shared.config import dump_scenario
 from shared.errors import SwarmTouchError
 from shared.formation import Formation
-from shared.nodes import OBSERVER, all_nodes
+from shared.nodes import OBSERVER, RELAY, all_nodes
 from shared.scenario import Scenario
 from shared.transport import Bus
 
@@ -76,7 +76,12 @@ class Phase:
 
 
 def fly(
-    scenario: Scenario, formation: Formation, seconds: float, *, edit: Edit = lambda row: row
+    scenario: Scenario,
+    formation: Formation,
+    seconds: float,
+    *,
+    edit: Edit = lambda row: row,
+    recorded_to: Path | None = None,
 ) -> tuple[FlightEar, Phase]:
     """Flies real agents in the simulated world and measures for a while in mid-flight.
 
@@ -85,6 +90,7 @@ def fly(
         formation: Its formation.
         seconds: Length of the measurement.
         edit: Changes rows of the process table.
+        recorded_to: Where a recorder leaves its trace; None for no recorder.
 
     Raises:
         BenchError: A process ended.
@@ -93,10 +99,11 @@ def fly(
     tcp_ports, (udp_port,) = free_ports(tcp=len(all_nodes(formation)), udp=1)
     scenario = resolve_scenario(scenario, formation, tcp_ports, udp_port)
     with tempfile.TemporaryDirectory() as folder, _observer(scenario, formation) as bus:
-        run_dir = Path(folder)
+        run_dir = recorded_to or Path(folder)
         file = run_dir / SCENARIO_FILE
         file.write_text(dump_scenario(scenario), encoding="utf-8")
-        rows = process_table(scenario, formation, file=file, hand=HAND, run_dir=run_dir)
+        record = recorded_to is not None
+        rows = process_table(scenario, formation, file=file, hand=HAND, run_dir=run_dir, record=record)
         ear = FlightEar(bus, formation)
         return ear, _run([edit(row) for row in rows], ear, seconds, len(formation.ids))
 

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 from deploy.cli.arguments import add_overrides
 
 DESCRIPTION = """Measures on this machine: latency from the hand to the drones, cost of a control step, many
-agents, the simulators, the start. Real swarms and bare ones (same processes, links and payload sizes, no
-control) take turns in the same run, so that load on the machine meets both. Method: docs/performance.md."""
+agents, the recorder, the simulators, the start. Real swarms and bare ones (same processes, links and payload
+sizes, no control) take turns in the same run, so that load on the machine meets both. Method:
+docs/performance.md."""
 EXAMPLE = """swarmtouch bench chain --seconds 20 --json
          swarmtouch bench scale --agents 4,8,16,32 --plot scale.svg
          swarmtouch bench step --update docs/performance.md"""
@@ -140,6 +141,16 @@ _KINDS = {
         "--drones 4,100,1000",
         "grid",
         (_sizes("drones", "4,100,1000,10000"), _seconds("5")),
+    ),
+    "record": Kind(
+        "whether a flight notices its recorder, and what the recording misses",
+        "--agents 12 --seconds 60",
+        "grid",
+        (
+            _option("agents", _positive(int), "12", "size of the swarm"),
+            _option("seconds", _positive(float), "60", "time that counts, with and without a recorder each, s"),
+            _rounds("3"),
+        ),
     ),
     "start": Kind(
         "from `swarmtouch up` to the first formation-wide step", "--n 10", "rhombus", (_number("10"),)

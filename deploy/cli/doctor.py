@@ -4,7 +4,7 @@ import argparse
 
 from deploy.cli.arguments import add_overrides
 
-DESCRIPTION = """Looks at Python, packages, ports, a real link, multicast, serial devices and their permissions,
+DESCRIPTION = """Looks at Python, packages, ports, a real link, multicast, keys, serial devices and permissions,
 the clock and the processor; each with what to do. Exit code 0: a swarm can fly here; 1: it cannot."""
 EXAMPLE = "swarmtouch doctor grid --set formation.n=16"
 

@@ -3,6 +3,7 @@
 import argparse
 
 from deploy.cli.arguments import add_scenario_arguments
+from deploy.net import FOLDER
 
 DESCRIPTION = """keys: makes the swarm's own certificate authority, issues a certificate per node, removes one,
 shows them all. config: writes the Zenoh configuration of any node in any profile, as its process uses it."""
@@ -30,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action = actions.add_parser(name, help=summary, description=summary)
         add_scenario_arguments(action)
         action.add_argument(
-            "--keys", default="keys", metavar="DIR", help="where keys lie (default: %(default)s)"
+            "--keys", default=FOLDER, metavar="DIR", help="where keys lie (default: %(default)s)"
         )
         if name in ("issue", "remove"):
             many = "*" if name == "issue" else "+"

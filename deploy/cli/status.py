@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Looks and returns the exit code."""
     from deploy.launcher.console import open_console  # noqa: PLC0415  --help must not load the bus
     from deploy.status.listen import listen  # noqa: PLC0415
-    from deploy.status.show import status_json, status_table  # noqa: PLC0415
+    from deploy.status.show import audit_table, status_json, status_table  # noqa: PLC0415
     from observer.swarm import running_scenario  # noqa: PLC0415
 
     scenario = running_scenario(arguments.run, arguments.overrides)
@@ -37,5 +37,6 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(status_json(rows)))
     else:
-        open_console(stderr=False).print(status_table(rows, f"swarm {scenario.swarm.name}"))
+        tables = status_table(rows, f"swarm {scenario.swarm.name}"), audit_table(rows)
+        open_console(stderr=False).print(*filter(None, tables))
     return 0 if all(row.well for row in rows) else 1

@@ -13,9 +13,10 @@ from attrs import frozen
 
 from deploy.launcher.keyboard import key_presses
 from deploy.launcher.monitor import Monitor
-from deploy.launcher.process_table import RELAY, ProcessRow
+from deploy.launcher.process_table import ProcessRow
 from deploy.launcher.supervisor import Child, Supervisor
 from shared.formation import Formation
+from shared.nodes import RELAY
 
 START_S = 8.0
 """The hand waits at most this long for all processes to announce themselves."""

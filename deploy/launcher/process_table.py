@@ -11,16 +11,9 @@ from attrs import frozen
 
 from shared.config import vehicle_settings
 from shared.formation import Formation
-from shared.nodes import all_nodes, loopback
+from shared.nodes import BRIDGE, CONSOLE, DRONE, OBSERVER, RELAY, WORLD, all_nodes, loopback
 from shared.radio_link import GROUP
 from shared.scenario import Scenario
-
-WORLD = "world"
-DRONE = "drone"
-BRIDGE = "bridge"
-RELAY = "relay"
-OBSERVER = "observer"
-CONSOLE = "console"
 
 
 @frozen(kw_only=True)

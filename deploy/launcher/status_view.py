@@ -14,8 +14,8 @@ from rich.text import Text
 
 from deploy.launcher.flight import Flight
 from deploy.launcher.glove_panel import GlovePanel
-from deploy.launcher.process_table import DRONE
 from shared.messages import DroneState, Flag, ProcessStatus
+from shared.nodes import DRONE
 
 LIVE_PERIOD_S = 0.5
 PLAIN_PERIOD_S = 5.0

@@ -10,9 +10,10 @@ from rich.table import Table
 
 from deploy.launcher.flight import Outcome
 from deploy.launcher.monitor import Monitor
-from deploy.launcher.process_table import DRONE, GloveChoice
+from deploy.launcher.process_table import GloveChoice
 from observer.agent_log import AgentSummary
 from observer.glove_log import GloveLog
+from shared.nodes import DRONE
 
 Json = dict[str, Any]
 

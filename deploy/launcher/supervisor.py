@@ -15,6 +15,8 @@ from pathlib import Path
 from attrs import define, field
 
 from deploy.launcher.process_table import ProcessRow
+from observer.console.arguments import TOKEN_VARIABLE
+from shared.nodes import CONSOLE
 from shared.process import EXIT_REFUSED, LAUNCHER_PID
 
 FIRST_BACKOFF_S = 0.25
@@ -118,7 +120,7 @@ class Supervisor:
                 stdout=log,
                 stderr=asyncio.subprocess.STDOUT,
                 start_new_session=True,
-                env=_environment(),
+                env=_environment(child.row),
             )
         child.starts += 1
         if self._ending.is_set():  # asked to end while the process was being created
@@ -150,9 +152,11 @@ def _write(child: Child, lines: list[str]) -> None:
         pipe.write("".join(f"{line}\n" for line in lines).encode())
 
 
-def _environment() -> dict[str, str]:
+def _environment(row: ProcessRow) -> dict[str, str]:
+    # Only the console has a use for its token.
+    hidden = set() if row.role == CONSOLE else {TOKEN_VARIABLE}
     return {
-        **os.environ,
+        **{name: value for name, value in os.environ.items() if name not in hidden},
         LAUNCHER_PID: str(os.getpid()),
         "PYTHONUNBUFFERED": "1",
         # The matrices of one agent are tiny: a pool of BLAS threads in each process would only cost memory.

@@ -12,8 +12,7 @@ import numpy as np
 
 from agents.agent import Agent
 from agents.settings import agent_settings, hand_settings
-from agents.vehicles.base import Pose
-from agents.vehicles.bodies.fleet import Fleet, advance_fleet
+from agents.vehicles.bodies.fleet import Fleet, advance_fleet, poses
 from agents.vehicles.bodies.state import Command, Commands
 from deploy.lockstep.hand_track import track_hand
 from deploy.lockstep.record import Moment, Record, make_record
@@ -49,6 +48,7 @@ class Lockstep:
         self.tick = 0
         self.payloads: dict[str, bytes] = {}
         self._encoded = encoded
+        self._charge = [1.0] * len(formation.ids)
         self._rate = scenario.rates.control_hz
         self._order = [row for level in formation.levels for row in level]
         self._agents = [
@@ -72,9 +72,10 @@ class Lockstep:
         """
         now = tick_ns(self.tick, self._rate)
         self._publish(HAND.key(), sample, now)
+        reports = poses(self.fleet, self._charge, self.tick)
         states: dict[int, DroneState] = {}
         for row in self._order:
-            states[row] = self._agents[row].step(now, self._pose(row), 0.0)
+            states[row] = self._agents[row].step(now, reports[row], 0.0)
             self._publish(self._keys[row], states[row], now)
         ordered = [states[row] for row in range(len(states))]
         kind = np.array([_COMMANDS.get(state.mode, Command.FLY) for state in ordered], dtype=np.int8)
@@ -94,18 +95,6 @@ class Lockstep:
         else:
             for agent in self._listeners[key]:
                 agent.senses.hear_drone(message, now_ns)
-
-    def _pose(self, row: int) -> Pose:
-        x, y, z = self.fleet.position[row].tolist()
-        vx, vy, vz = self.fleet.velocity[row].tolist()
-        return Pose(
-            position=(x, y, z),
-            velocity=(vx, vy, vz),
-            yaw=0.0,
-            battery=1.0,
-            airborne=bool(self.fleet.airborne[row]),
-            seq=self.tick,
-        )
 
 
 def fly_lockstep(

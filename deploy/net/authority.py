@@ -18,6 +18,7 @@ from shared.net.keyring import MEMBERS_FILE, Keyring, stem
 
 try:
     from cryptography import x509
+    from cryptography.exceptions import UnsupportedAlgorithm
     from cryptography.hazmat.primitives import hashes, serialization
     from cryptography.hazmat.primitives.asymmetric import ec, ed25519
     from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
@@ -158,12 +159,11 @@ def issued(keyring: Keyring) -> list[Issued]:
 
 def _describe(file: Path, members: Sequence[str]) -> Issued:
     certificate = _load(file)
-    name = str(certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)[0].value)
     try:
-        names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-        hosts = tuple(str(entry.value) for entry in names)
-    except x509.ExtensionNotFound:
-        hosts = ()
+        name = str(certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)[0].value)
+        hosts = _hosts(certificate)
+    except (ValueError, IndexError, x509.DuplicateExtension, x509.UnsupportedGeneralNameType) as error:
+        raise ConfigError(f"{file}: not a certificate of a node ({error})") from error
     return Issued(
         name=name,
         hosts=hosts,
@@ -173,11 +173,19 @@ def _describe(file: Path, members: Sequence[str]) -> Issued:
     )
 
 
+def _hosts(certificate: x509.Certificate) -> tuple[str, ...]:
+    try:
+        names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except x509.ExtensionNotFound:
+        return ()
+    return tuple(str(entry.value) for entry in names)
+
+
 def _authority(keyring: Keyring) -> tuple[x509.Certificate, ec.EllipticCurvePrivateKey]:
     hint = "issue certificates where swarmtouch net keys init was run"
     try:
         key = serialization.load_pem_private_key(keyring.authority_key.read_bytes(), password=None)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError, UnsupportedAlgorithm) as error:
         raise ConfigError(f"{keyring.authority_key}: no key of an authority ({error}); {hint}") from error
     if not isinstance(key, ec.EllipticCurvePrivateKey):
         raise ConfigError(f"{keyring.authority_key}: not an elliptic-curve key; {hint}")
@@ -187,7 +195,7 @@ def _authority(keyring: Keyring) -> tuple[x509.Certificate, ec.EllipticCurvePriv
 def _load(file: Path) -> x509.Certificate:
     try:
         return x509.load_pem_x509_certificate(file.read_bytes())
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, x509.InvalidVersion) as error:
         raise ConfigError(f"{file}: not a certificate ({error})") from error
 
 

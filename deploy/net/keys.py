@@ -10,6 +10,7 @@ from rich.table import Table
 
 from deploy.net.authority import WARN_DAYS, create, issue, issued, remove
 from shared.config import load_scenario
+from shared.errors import ConfigError
 from shared.formation import Formation, build_formation
 from shared.net.keyring import Keyring
 from shared.nodes import all_nodes, endpoint
@@ -42,7 +43,10 @@ def run(arguments: argparse.Namespace) -> int:
 def _hosts(scenario: Scenario, formation: Formation, node: str) -> tuple[str, ...]:
     """Returns the host under which the scenario has others dial a node."""
     address = endpoint(scenario, formation, node) if node in all_nodes(formation) else ""
-    host = urlsplit(f"//{address.partition('/')[2]}").hostname if address else None
+    try:
+        host = urlsplit(f"//{address.partition('/')[2]}").hostname if address else None
+    except ValueError as error:
+        raise ConfigError(f"net.endpoints.{node}: {address!r}: {error}") from error
     return (host,) if host else ()
 
 

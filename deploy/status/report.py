@@ -5,8 +5,9 @@ from collections.abc import Collection, Iterable
 from attrs import frozen
 
 from shared.messages import DroneState, Flag, ProcessStatus
+from shared.net.audit import LINKED, REFUSED
+from shared.nodes import DRONE, RELAY, WORLD
 
-DRONE, RELAY, WORLD = "drone", "relay", "world"
 WELL_STATES = ("running", "starting")
 WORRYING = (
     Flag.BLOCKED | Flag.FENCE | Flag.LOW_BATTERY | Flag.CRITICAL_BATTERY | Flag.OLD_POSE | Flag.HAND_STALE
@@ -41,6 +42,20 @@ class Row:
     token: str
     heard: Heard
     problems: tuple[str, ...]
+
+    @property
+    def links(self) -> dict[str, int]:
+        """Who is linked to it, by the name in the certificate, and how often; empty without keys."""
+        return self._audited(LINKED)
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Whom it has refused, with what, and how often."""
+        return self._audited(REFUSED)
+
+    def _audited(self, prefix: str) -> dict[str, int]:
+        metrics = self.heard.status.metrics if self.heard.status else {}
+        return {name.removeprefix(prefix): int(n) for name, n in metrics.items() if name.startswith(prefix)}
 
     @property
     def well(self) -> bool:

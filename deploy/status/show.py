@@ -20,6 +20,21 @@ def status_table(rows: list[Row], title: str) -> Table:
     return table
 
 
+def audit_table(rows: list[Row]) -> Table | None:
+    """Draws who is linked to whom and who was refused, None for a swarm without keys."""
+    if not any(row.links or row.refused for row in rows):
+        return None
+    table = Table(title="links by certificate, and who was refused", title_justify="left", box=box.SIMPLE_HEAD)
+    for name in ("process", "linked to", "refused"):
+        table.add_column(name, no_wrap=name == "process")
+    for row in rows:
+        refused = "\n".join(f"{who}: {n} times" for who, n in row.refused.items())
+        table.add_row(
+            row.token, ", ".join(sorted(row.links)), refused or "-", style="yellow" if row.refused else None
+        )
+    return table
+
+
 def status_json(rows: list[Row]) -> list[dict[str, Any]]:
     """Returns one object per process: `process`, `well`, `problems`, and what it said of itself."""
     return [
@@ -31,6 +46,8 @@ def status_json(rows: list[Row]) -> list[dict[str, Any]]:
             "rate_hz": row.heard.status.rate_hz if row.heard.status else None,
             "cpu": row.heard.status.cpu if row.heard.status else None,
             "rss_mb": row.heard.status.rss_mb if row.heard.status else None,
+            "links": row.links,
+            "refused": row.refused,
         }
         for row in rows
     ]

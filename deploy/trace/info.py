@@ -14,11 +14,12 @@ from rich.text import Text
 
 from deploy.launcher.console import open_console
 from deploy.trace.listen import listen
-from observer.link_stats import OBSERVER, LinkSummary, SwarmLinks
+from observer.link_stats import LinkSummary, SwarmLinks
 from observer.swarm import running_scenario
 from observer.trace.read import Trace, decode_on, open_trace
 from shared.clock import NS_PER_S, system_clock
 from shared.errors import DecodeError
+from shared.nodes import OBSERVER
 from shared.process import prepare_process
 from shared.topics import TOPICS
 

@@ -1,13 +1,13 @@
 """Tactile patterns: data files, their schema, and what is loaded from them."""
 
 import difflib
-import tomllib
 from pathlib import Path
 
 from glove_bridge.patterns.pattern import Frame, Pattern, PatternSet
 from glove_bridge.patterns.schema import LONGEST_PATTERN_MS, PatternFile, PatternRow
 from shared.config import structure
 from shared.errors import ConfigError
+from shared.toml_text import read_toml
 
 FOLDER = Path(__file__).resolve().parent
 CUES = "cues"
@@ -29,11 +29,7 @@ def load_patterns(source: str | Path) -> PatternSet:
         ConfigError: What is wrong, with file, key and a hint.
     """
     path = _find(source)
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
-    file = structure(tree, PatternFile, str(path))
+    file = structure(read_toml(path), PatternFile, str(path))
     return PatternSet(
         name=path.stem,
         about=file.about,

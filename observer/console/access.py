@@ -34,13 +34,16 @@ def is_same_site(origin: str | None, host: str) -> bool:
     """Says whether an Origin header is this site's; programs that are no browser send none."""
     if origin is None:
         return True
-    parts = urlsplit(origin)
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return False
     return parts.scheme in ("http", "https") and parts.netloc.lower() == host.lower()
 
 
 def is_token(given: str | None, token: str) -> bool:
     """Compares in constant time."""
-    return given is not None and hmac.compare_digest(given.encode(), token.encode())
+    return given is not None and hmac.compare_digest(given.encode(errors="replace"), token.encode())
 
 
 def is_loopback(address: str) -> bool:

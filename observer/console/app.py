@@ -3,13 +3,13 @@
 import asyncio
 import contextlib
 import socket
-from http.cookies import SimpleCookie
 from pathlib import Path
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.middleware import Middleware
+from starlette.requests import cookie_parser
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.routing import Mount, WebSocketRoute
 from starlette.staticfiles import StaticFiles
@@ -157,5 +157,5 @@ def _cookie_name(scope: Scope) -> str:
 
 
 def _cookie(headers: Headers, name: str) -> str | None:
-    morsel = SimpleCookie(headers.get("cookie", "")).get(name)
-    return morsel.value if morsel else None
+    # The standard library's parser raises at another program's cookie with an unusual name.
+    return cookie_parser(headers.get("cookie", "")).get(name)

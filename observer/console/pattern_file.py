@@ -43,7 +43,7 @@ def read_patterns(path: Path) -> Patterns:
             for name, rows in tree["frames"].items()
         }
         return Patterns(frames, frozenset(map(str, tree["cues"])))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except Exception as error:
         raise ConfigError(
             f"{path}: no readable pattern file ({type(error).__name__}: {error});"
             " swarmtouch up --console writes one"

@@ -6,7 +6,6 @@ types, unknown or missing fields, non-finite numbers and oversized messages are 
 """
 
 import json
-import math
 from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
 
@@ -144,7 +143,8 @@ def _want(wish: Any) -> Want:
 
 
 def _number(value: Any, limit: float) -> float:
-    if type(value) not in (int, float) or not (math.isfinite(value) and abs(value) <= limit):
+    # A NaN fails every comparison, and a whole number of any length can be compared.
+    if type(value) not in (int, float) or not abs(value) <= limit:
         raise DecodeError("out-of-range", f"a number within +-{limit:g} is expected, not {value!r:.40}")
     return float(value)
 

@@ -26,6 +26,7 @@ from shared.messages import (
     ProcessStatus,
     Vector,
 )
+from shared.nodes import WORLD
 from shared.senses import Sensed, Senses
 from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, STATUS
 from shared.transport import Arrival
@@ -37,7 +38,6 @@ Frames = Mapping[str, Sequence[Json]]
 MYSELF = "console/0"
 """A process does not hear itself; of another console only that it is there would be known."""
 _AIRBORNE = frozenset({Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND})
-_WORLD = "world"
 
 
 class SwarmView:
@@ -126,7 +126,7 @@ class SwarmView:
 
     def health(self, now_ns: int) -> Json:
         """Returns the `health` message."""
-        world = self._statuses.get(f"{_WORLD}/0")
+        world = self._statuses.get(f"{WORLD}/0")
         return {
             "type": "health",
             "t": self._seconds(now_ns),

@@ -6,7 +6,6 @@ is skipped.
 """
 
 import struct
-import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,9 +25,11 @@ from shared.config import structure_scenario
 from shared.errors import ConfigError, DecodeError
 from shared.messages import DroneState, Message
 from shared.scenario import Scenario
+from shared.toml_text import parse_toml
 from shared.topics import DRONE_STATE, topic_of
 
 _LARGEST_RECORD = 1 << 28
+_LONGEST_COUNT = 20
 _DAMAGE = (MemoryError, McapError, ZstdError, struct.error, ValueError, RuntimeError)
 
 
@@ -109,7 +110,7 @@ class Trace:
             if isinstance(item, Chunk):
                 yield from self._records_of(item, topics)
             elif isinstance(item, Metadata) and item.name == RECORDER:
-                dropped = int(item.metadata["dropped"])
+                dropped = _count(item.metadata.get("dropped", ""))
         self.dropped += dropped
 
     def _records_of(self, chunk: Chunk, topics: dict[int, str]) -> Iterator[Record]:
@@ -182,9 +183,13 @@ def _head(file: Path) -> dict[str, dict[str, str]]:
 
 def _scenario(metadata: dict[str, dict[str, str]], file: Path) -> Scenario:
     try:
-        return structure_scenario(tomllib.loads(metadata[SCENARIO]["toml"]), str(file))
-    except (KeyError, tomllib.TOMLDecodeError) as error:
+        return structure_scenario(parse_toml(metadata[SCENARIO]["toml"], str(file)), str(file))
+    except KeyError as error:
         raise ConfigError(f"{file}: not a trace of a swarm: it holds no scenario") from error
+
+
+def _count(text: str) -> int:
+    return int(text) if text.isdecimal() and len(text) < _LONGEST_COUNT else 0
 
 
 def _record(key: str, message: McapMessage) -> Record:

@@ -17,8 +17,12 @@ REPORT_NS = NS_PER_S
 """Refusals are logged at most this often."""
 MAX_NAMES = 16
 """Names are chosen by whoever knocks: more than this many are counted together."""
+MAX_NAME = 80
+"""So is the key that they try: longer ones are cut, for a status has to stay small enough to be heard."""
 MAX_IDENTITIES = 256
 OTHERS = "others"
+LINKED, REFUSED = "linked ", "refused "
+"""What the numbers begin with; the rest is the name."""
 STRANGER = "a node without a certificate of ours"
 
 _DECISION = re.compile(
@@ -85,8 +89,8 @@ class Audit:
         """Returns who is linked and how often whom was refused, as numbers for a process's status."""
         with self._lock:
             links = Counter(self._names.get(identity, STRANGER) for identity in self._present)
-            named = {f"linked {name}": float(n) for name, n in links.most_common(MAX_NAMES)}
-            return named | {f"refused {who}": float(n) for who, n in self._refused.items()}
+            named = {f"{LINKED}{name}": float(n) for name, n in links.most_common(MAX_NAMES)}
+            return named | {f"{REFUSED}{who}": float(n) for who, n in self._refused.items()}
 
     def _read_line(self, line: str) -> None:
         # A decision may be made ahead of any message, and on each of several grounds: what is dropped counts,
@@ -107,4 +111,5 @@ class Audit:
             del self._names[next(iter(self._names))]
 
     def _count(self, who: str) -> None:
+        who = who[:MAX_NAME]
         self._refused[who if who in self._refused or len(self._refused) < MAX_NAMES else OTHERS] += 1

@@ -1,6 +1,6 @@
 """Where a node's keys lie: file names only; `deploy.net` makes them, Zenoh and `shared.signature` read them."""
 
-import tomllib
+import re
 from pathlib import Path
 
 from attrs import frozen
@@ -8,8 +8,10 @@ from attrs import frozen
 from shared.errors import ConfigError
 from shared.scenario import Net
 from shared.signature import Sign, Verify, sign_with, verify_with
+from shared.toml_text import read_toml
 
 MEMBERS_FILE = "members.toml"
+_NODE_NAME = re.compile(r"[a-z]+(/[1-9][0-9]{0,4})?")
 
 
 @frozen
@@ -57,12 +59,13 @@ class Keyring:
             ConfigError: The file is missing or not of this form.
         """
         file = self.folder / MEMBERS_FILE
-        try:
-            members = tomllib.loads(file.read_text(encoding="utf-8"))["members"]
-        except (OSError, ValueError, KeyError) as error:
-            raise ConfigError(f"{file}: no list of members ({error}); see swarmtouch net keys issue") from error
-        if not isinstance(members, list) or not all(isinstance(member, str) for member in members):
-            raise ConfigError(f"{file}: members must be a list of node names")
+        members = read_toml(file, "copy it here from where swarmtouch net keys issue was run").get("members")
+        if not isinstance(members, list):
+            raise ConfigError(f"{file}: no list of members; see swarmtouch net keys issue")
+        for member in members:
+            # A name becomes part of the keys in the access rules: no wildcard may come in.
+            if not (isinstance(member, str) and _NODE_NAME.fullmatch(member)):
+                raise ConfigError(f"{file}: {member!r} is no name of a node; for example relay, drone/2")
         return tuple(members)
 
 

@@ -119,7 +119,7 @@ def test_sound_is_off_until_asked_for(open_pilot: OpenPilot) -> None:
 
 def test_tactile_only_hides_drones_and_obstacles(open_pilot: OpenPilot) -> None:
     pilot = open_pilot()
-    pilot.told("snapshot")
+    pilot.take_off()
     count = """() => {
         const canvas = document.getElementById("surface");
         const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import attrs
 
-from deploy.launcher.process_table import BRIDGE, CONSOLE, ProcessRow
+from deploy.launcher.process_table import ProcessRow
 from deploy.net.authority import create, issue
 from shared.clock import NS_PER_S
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
 from shared.net.keyring import Keyring
-from shared.nodes import OBSERVER, all_nodes
+from shared.nodes import BRIDGE, CONSOLE, OBSERVER, all_nodes
 from shared.scenario import Net, Profile, Scenario
 from tests.chaos.lab import Lab
 from tests.integration.recorder import START_S, Recorder

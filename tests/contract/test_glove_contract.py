@@ -248,7 +248,7 @@ def test_a_terminal_that_is_gone_fails_patterns() -> None:
         ("serial:///dev/x?speed=9600", "unknown option 'speed'; known ones: baud, link, calibration"),
         ("serial:///dev/x?baud=1", "baud=1; known ones: 9600, 19200"),
         ("serial:///dev/x?link=wifi", "link=wifi; known ones: usb, xbee"),
-        ("serial:///dev/x?calibration=/nowhere.toml", "/nowhere.toml: no calibration"),
+        ("serial:///dev/x?calibration=/nowhere.toml", "/nowhere.toml: cannot be read"),
     ],
 )
 def test_a_wrong_uri_is_refused_with_a_hint(uri: str, expected: str) -> None:

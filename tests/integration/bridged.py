@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from deploy.launcher.process_table import BRIDGE as ROLE
 from deploy.launcher.process_table import ProcessRow
 from shared.bus import ZenohBus
 from shared.clock import system_clock
@@ -16,6 +15,7 @@ from shared.formation import build_formation
 from shared.messages import FormationState, PatternEvent
 from shared.net.settings import peer_settings
 from shared.nodes import BRIDGE, endpoint
+from shared.nodes import BRIDGE as ROLE
 from shared.scenario import Scenario
 from shared.topics import FORMATION_STATE, PATTERN
 from shared.transport import Inbox

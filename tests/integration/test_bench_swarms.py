@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from attrs import evolve
 
-from deploy.bench import chain, scale, start
+from deploy.bench import chain, record, scale, start
 from deploy.bench.figures import spread
 from deploy.bench.hop import HAND_ID
 from deploy.bench.swarm import BenchError, fly, fly_bare_udp, fly_bare_zenoh
@@ -96,6 +96,18 @@ def test_scale_keeps_its_contract() -> None:
     assert 0.0 < record["on_time_worst"] <= record["on_time"] <= 1.0
     assert record["cpu_cores"] > 3 * record["cpu_per_agent"] > 0.0
     assert record["rss_mb"] > 10.0
+
+
+def test_record_keeps_its_contract_and_reads_its_trace() -> None:
+    report = record.measure(agents=2, seconds=1.5, rounds=1, overrides=[QUICK_TAKEOFF])
+    (measured,) = report.records
+    assert all(math.isfinite(number) for number in numbers(measured))
+    assert (measured["agents"], measured["ready"]) == (2, True)
+    assert measured["ratio"] == pytest.approx(measured["late_p50_ms"] / measured["unrecorded_p50_ms"])
+    # The hand, two agents and every status; 1.5 s of it were measured, more was recorded.
+    assert measured["messages"] > 3 * 60
+    assert measured["links"] >= 3
+    assert 0.0 < measured["recorder_cores"] < 1.0
 
 
 def test_start_keeps_its_contract() -> None:

@@ -9,6 +9,9 @@ import pytest
 
 from tests.replay.flights import require_flight
 
+LEAST_USED = 0.98
+"""Fraction of the hand's samples that a step uses on a busy machine; idle, it is 1 (docs/performance.md)."""
+
 
 @pytest.mark.timeout(120)
 def test_the_maze_is_flown_by_the_recorded_hand(tmp_path: Path) -> None:
@@ -32,6 +35,6 @@ def test_the_maze_is_flown_by_the_recorded_hand(tmp_path: Path) -> None:
     assert (summary["collisions"], summary["fence_exits"], summary["restarts"]) == (0, 0, 0)
     assert [agent["id"] for agent in summary["agents"]] == [1, 2, 3]
     for agent in summary["agents"]:
-        assert agent["hand_used"] >= 0.995, agent
+        assert agent["hand_used"] >= LEAST_USED, agent
         assert agent["steps"] > 1_000
     assert "Traceback" not in "".join(path.read_text() for path in tmp_path.glob("*/logs/*.log"))

@@ -19,7 +19,7 @@ from attrs import frozen
 from deploy.bench.usage import read_usage
 from deploy.launcher.ports import free_ports
 from deploy.launcher.process_table import resolve_scenario
-from observer.link_stats import OBSERVER, SwarmLinks
+from observer.link_stats import SwarmLinks
 from observer.swarm import open_observer
 from observer.trace.layout import trace_files
 from observer.trace.read import Record, open_trace
@@ -29,7 +29,7 @@ from shared.clock import NS_PER_S, system_clock
 from shared.codec import encode
 from shared.formation import build_formation
 from shared.messages import Message, Mode, ProcessStatus
-from shared.nodes import all_nodes
+from shared.nodes import OBSERVER, all_nodes
 from shared.scenario import Net
 from shared.topics import DRONE_STATE, HAND, TOPICS
 from shared.transport import Arrival, Inbox
@@ -43,7 +43,7 @@ pytestmark = [
 ]
 
 LOST_AT_KILL_NS = NS_PER_S // 2
-MOST_LOST = 0.005
+MOST_LOST = 0.05
 """Fraction of best-effort messages that a link may lose on a busy machine; idle, it loses none."""
 SHARE_OF_A_CORE = 0.25
 
@@ -143,7 +143,7 @@ def test_the_trace_holds_every_byte_that_was_said(flown: Flown) -> None:
 
 
 def check_loss(recorded: list[tuple[Record, Message]], missing: set[tuple[str, int, int]]) -> None:
-    """Loss is what the ear outside heard and the trace does not hold, and it is next to nothing."""
+    """Loss is told as the gaps in the numbers, and covers what the ear outside heard and the trace lacks."""
     swarm = SwarmLinks()
     for record, message in recorded:
         swarm.add(record.key, message, record.log_ns)
@@ -151,7 +151,15 @@ def check_loss(recorded: list[tuple[Record, Message]], missing: set[tuple[str, i
         seqs = [(message.epoch, message.seq) for record, message in recorded if record.key == row.key]
         if row.listener == OBSERVER:
             lost = [place for place in missing if place[0] == row.key and min(seqs) < place[1:] < max(seqs)]
-            assert len(lost) <= row.missing <= MOST_LOST * row.messages + 1
+            assert len(lost) <= row.missing == gaps(seqs) <= MOST_LOST * row.messages + 1
+
+
+def gaps(seqs: Iterable[tuple[int, int]]) -> int:
+    """Counts the numbers that are missing between an epoch's first and last, (epoch, seq) given."""
+    by_epoch: dict[int, set[int]] = {}
+    for epoch, seq in seqs:
+        by_epoch.setdefault(epoch, set()).add(seq)
+    return sum(max(seen) - min(seen) + 1 - len(seen) for seen in by_epoch.values())
 
 
 def test_last_words_are_in_the_trace_and_the_recorder_is_cheap(flown: Flown) -> None:

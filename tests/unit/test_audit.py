@@ -1,6 +1,8 @@
 """Who is linked and who is refused, from Zenoh's events and its own log."""
 
 from shared.clock import NS_PER_S
+from shared.codec import MAX_PAYLOAD, encode
+from shared.messages import ProcessStatus
 from shared.net.audit import MAX_NAMES, OTHERS, Audit
 
 ZID = "3551f63a5eee554bf53356f9eeea927f"
@@ -87,3 +89,22 @@ def test_whoever_knocks_cannot_fill_the_memory() -> None:
     refused = watched.metrics()
     assert len(refused) == MAX_NAMES + 1
     assert refused[f"refused {OTHERS}"] == 1000.0 - MAX_NAMES
+
+
+def test_whoever_knocks_cannot_make_a_status_too_large_to_be_heard() -> None:
+    watched = audit()
+    for number in range(2 * MAX_NAMES):
+        watched.linked(f"{number:x}", f"{number}" + "m" * 62, present=True)
+        watched.read(REFUSED.replace("s/human/hand", f"s/{number}/" + "x" * 4000))
+    status = ProcessStatus(
+        epoch=1,
+        seq=1,
+        stamp_ns=1,
+        role="drone",
+        id=1,
+        pid=1,
+        host="h" * 64,
+        state="running",
+        metrics=watched.metrics(),
+    )
+    assert len(encode(status)) <= MAX_PAYLOAD - 500  # what else an agent tells of itself

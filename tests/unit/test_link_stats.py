@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from observer.link_stats import OBSERVER, LinkStats, LinkSummary, SwarmLinks
+from observer.link_stats import LinkStats, LinkSummary, SwarmLinks
 from shared.messages import Heard
+from shared.nodes import OBSERVER
 from shared.topics import DRONE_STATE, HAND
 from tests.traces import hand, state
 

@@ -83,6 +83,16 @@ def test_the_field_has_certificates_rules_and_guards(field: Scenario) -> None:
     assert settings["low_pass_filter"][0]["size_limit"] > MAX_PAYLOAD
 
 
+def test_beside_an_endpoint_of_datagrams_stands_one_of_tcp() -> None:
+    scenario = load_scenario("rhombus", ["net.endpoint=udp/{node}.local:7447"])
+    settings = node_settings(scenario, RHOMBUS, "drone/1")
+    assert settings["listen"]["endpoints"] == ["tcp/drone-1.local:7447?rel=1", "udp/drone-1.local:7447?rel=0"]
+    assert settings["connect"]["endpoints"] == ["tcp/relay.local:7447?rel=1", "udp/relay.local:7447?rel=0"]
+    assert settings["transport"]["unicast"]["max_links"] == 2
+    plain = node_settings(load_scenario("rhombus"), RHOMBUS, "drone/1")
+    assert "max_links" not in plain["transport"]["unicast"]
+
+
 def test_a_node_without_its_key_is_told_where_to_get_it(field: Scenario, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"net\.keys: profile field needs keys"):
         node_settings(load_scenario("rhombus", ["net.profile=field"]), RHOMBUS, "drone/2")

@@ -3,6 +3,8 @@
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from cryptography.hazmat.primitives.serialization import BestAvailableEncryption, Encoding, PrivateFormat
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -94,3 +96,11 @@ def test_missing_and_wrong_keys_are_refused_by_name(keyring: Keyring, tmp_path: 
         verify_with(tmp_path / "absent.pub")
     with pytest.raises(ConfigError, match="not an Ed25519 key"):
         sign_with(keyring.authority_key)
+    locked = tmp_path / "locked.key"
+    locked.write_bytes(
+        Ed25519PrivateKey.generate().private_bytes(
+            Encoding.PEM, PrivateFormat.PKCS8, BestAvailableEncryption(b"password")
+        )
+    )
+    with pytest.raises(ConfigError, match=r"locked\.key: no readable key"):
+        sign_with(locked)

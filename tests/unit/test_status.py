@@ -1,13 +1,18 @@
 """`swarmtouch status`: the verdicts, and what it says of a swarm that is not there."""
 
 import json
+import re
+from io import StringIO
 
 import pytest
+from attrs import evolve
+from rich.console import Console
 
 from deploy.cli import main
 from deploy.status.report import Heard, expected_processes, judge, rows_of
-from deploy.status.show import status_json, status_table
+from deploy.status.show import audit_table, status_json, status_table
 from shared.messages import NO_FLAGS, DroneState, Flag, Mode, ProcessStatus
+from shared.net.audit import Audit
 
 
 def status(state: str = "running") -> ProcessStatus:
@@ -74,6 +79,28 @@ def test_the_table_and_the_json_say_the_same() -> None:
         ("drone/1", True, []),
         ("relay/0", False, ["absent", "says nothing"]),
     ]
+
+
+def test_who_is_linked_and_who_was_refused_is_shown_by_name_and_is_no_illness() -> None:
+    audit = Audit(["relay", "drone/2"])
+    audit.linked("3551f63a5eee", "relay", present=True)
+    audit.linked("7777", "mallory", present=True)
+    seen = evolve(status(), metrics={"late": 1.0, **audit.metrics()})
+    rows = [judge("drone/1", Heard(present=True, status=seen, state=drone())), judge("relay/0", Heard())]
+    assert rows[0].well
+    assert [(line["links"], line["refused"]) for line in status_json(rows)] == [
+        ({"relay": 1, "mallory": 1}, {"mallory": 1}),
+        ({}, {}),
+    ]
+    table = audit_table(rows)
+    assert table is not None
+    shown = StringIO()
+    Console(width=120, file=shown).print(table)
+    assert {"mallory, relay", "mallory: 1 times"} <= set(re.split(r"\s{2,}|\n", shown.getvalue()))
+
+
+def test_a_swarm_without_keys_has_no_table_of_links() -> None:
+    assert audit_table([judge("drone/1", Heard(present=True, status=status(), state=drone()))]) is None
 
 
 def test_a_swarm_that_is_not_there_is_not_well(

@@ -33,8 +33,10 @@ def step_links(
         dt: Step, s, > 0.
     """
     return tuple(
-        _step_link(state, discretise(link.mass, link.damping, link.stiffness, link.gain, dt), hand_velocity)
-        for state, link in zip(states, links, strict=True)
+        [
+            _step_link(state, discretise(link.mass, link.damping, link.stiffness, link.gain, dt), hand_velocity)
+            for state, link in zip(states, links, strict=True)
+        ]
     )
 
 

@@ -125,8 +125,12 @@ def replace_lost(
         dt: Time since the last step, s.
     """
     return tuple(
-        _advance(stand_in, each, reference, hand_velocity, dt)
-        for stand_in, each, reference in zip(stand_ins, kin, heard, strict=True)
+        [
+            _advance(stand_in, each, reference, hand_velocity, dt)
+            if stand_in.share > 0.0 or _is_gone(reference)
+            else stand_in
+            for stand_in, each, reference in zip(stand_ins, kin, heard, strict=True)
+        ]
     )
 
 
@@ -134,13 +138,10 @@ def _advance(
     stand_in: StandIn, kin: Kin, reference: Reference | None, hand_velocity: Vector, dt: float
 ) -> StandIn:
     share, heard_for, links = stand_in
-    gone = _is_gone(reference)
-    if share == 0.0 and not gone:
-        return stand_in
     heard_for = heard_for + dt if is_fit(reference) else 0.0
     if reference is None:
         share = 1.0  # nothing to blend from: it was never there
-    elif gone or heard_for < RETURN_AFTER:
+    elif _is_gone(reference) or heard_for < RETURN_AFTER:
         share = min(share + dt / BLEND, 1.0)
     else:
         share -= dt / BLEND
@@ -172,6 +173,8 @@ def guides(
     Returns:
         None in the place of an ancestor that is neither fit nor replaced: it has not joined yet.
     """
+    if not any(stand_in.share for stand_in in stand_ins):
+        return [guide_of(reference) for reference in heard[:wanted]]
     known: dict[int, Guide | None] = {}
     return [_guide(place, stand_ins, kin, heard, hand, known) for place in range(wanted)]
 

@@ -5,6 +5,7 @@ six-degree-of-freedom one for steps up to 1 m (DESIGN section 7b).
 """
 
 import math
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,14 +25,17 @@ DRAG = 0.05
 """Effective linear drag, 1/s: brings the x step's overshoot from 18.7 % to the 17 % of the full model."""
 
 
-def thrust_of(pwm: Vec) -> Vec:
+Number = TypeVar("Number", float, Vec)
+
+
+def thrust_of(pwm: Number) -> Number:
     """Static thrust of the four rotors (Foerster 2015).
 
     Args:
-        pwm: (N,) motor command 0..65535; 0 is motors off.
+        pwm: Motor command 0..65535, of one body or (N,); 0 is motors off.
 
     Returns:
-        (N,) N.
+        N, shaped alike.
     """
     rotors = 4.0 * ((2.130295e-11 * pwm + 1.032633e-6) * pwm + 5.484560e-4)
     return rotors * (pwm > 0.0)

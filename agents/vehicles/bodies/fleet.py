@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from attrs import evolve, field, frozen
 
+from agents.vehicles.base import Pose
 from agents.vehicles.bodies.advance import BODIES, advance
 from agents.vehicles.bodies.pid import hovering
 from agents.vehicles.bodies.state import AIRBORNE_HEIGHT, BodyState, Commands, Mask, Vec, at_rest
@@ -92,8 +93,26 @@ def advance_fleet(fleet: Fleet, commands: Commands, duration: float) -> Fleet:
         if fleet.held:
             state = _held_back(group.state, state, _rows_of(fleet.ids, rows, fleet.held))
         position[rows], velocity[rows] = state.position, state.velocity
-        groups.append(evolve(group, state=state))
-    return evolve(fleet, position=position, velocity=velocity, groups=tuple(groups))
+        groups.append(Group(group.body, rows, state))
+    return Fleet(fleet.ids, position, velocity, tuple(groups), fleet.held)
+
+
+def poses(fleet: Fleet, charge: Sequence[float], seq: int) -> list[Pose]:
+    """Returns what each vehicle reports, one per row.
+
+    Args:
+        fleet: The bodies now.
+        charge: (N,) of their batteries, 0..1.
+        seq: Number of this report.
+    """
+    rows = zip(
+        map(tuple, fleet.position.tolist()),
+        map(tuple, fleet.velocity.tolist()),
+        charge,
+        fleet.airborne.tolist(),
+        strict=True,
+    )
+    return [Pose(position, velocity, 0.0, left, airborne, seq) for position, velocity, left, airborne in rows]
 
 
 def _rows_of(ids: Sequence[int], rows: Rows, held: AbstractSet[int]) -> Mask:

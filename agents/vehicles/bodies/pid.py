@@ -25,9 +25,10 @@ ALL_AXES = slice(0, 3)
 VERTICAL = slice(2, 3)
 
 _HOVER_INTEGRAL = np.array([0.0, 0.0, HOVER_PWM / KI[2]])
-# A little less than hover, or a body whose set-point is on the ground would slide about weightless.
-_GROUND_INTEGRAL = 0.99 * _HOVER_INTEGRAL
-_ROUNDING = 1e-9
+GROUND_INTEGRAL = 0.99 * _HOVER_INTEGRAL
+"""A little less than hover, or a body whose set-point is on the ground would slide about weightless."""
+ROUNDING = 1e-9
+"""A tick is due within this much of its time, s."""
 
 
 def hovering(positions: Vec) -> BodyState:
@@ -64,7 +65,7 @@ def control(state: BodyState, commands: Commands, axes: slice, dt: float) -> Bod
         axes: Axes that this PID flies; the others' integral and output are left alone.
         dt: Substep, s.
     """
-    if state.wait > _ROUNDING:
+    if state.wait > ROUNDING:
         return state._replace(wait=state.wait - dt)
     flying = commands.flying
     error = np.where(flying, commands.setpoint - state.position, np.nan)[:, axes]
@@ -73,7 +74,7 @@ def control(state: BodyState, commands: Commands, axes: slice, dt: float) -> Bod
     limit = INTEGRAL_LIMIT[axes]
     integral = clip(state.integral[:, axes] + error * PERIOD, -limit, limit)
     integral = np.where(flying, integral, state.integral[:, axes])
-    integral = np.where(state.grounded[:, None], _GROUND_INTEGRAL[axes], integral)
+    integral = np.where(state.grounded[:, None], GROUND_INTEGRAL[axes], integral)
     wanted = KP[axes] * error + KD[axes] * rate + KI[axes] * integral
     output = _open_loop(state, commands)
     output[:, axes] = np.where(flying, clip(wanted, OUTPUT_MIN[axes], OUTPUT_MAX[axes]), output[:, axes])

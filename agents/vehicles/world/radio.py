@@ -7,8 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from agents.vehicles.base import Pose
-from agents.vehicles.bodies.fleet import Fleet
+from agents.vehicles.bodies.fleet import Fleet, poses
 from agents.vehicles.bodies.link_loss import apply_link_loss
 from agents.vehicles.bodies.state import Command, Commands, Mask, Vec
 from agents.vehicles.link import MAX_DATAGRAM, Order, Verb, decode_order, encode_pose
@@ -97,16 +96,13 @@ class Radio:
             mute: (N,) whose pose does not come.
             seq: Number of this report.
         """
-        airborne = fleet.airborne
+        reports, silent = poses(fleet, charge.tolist(), seq), mute.tolist()
         for drone, driver in self._drivers.items():
             row = self._row[drone]
-            if mute[row]:
+            if silent[row]:
                 continue
-            x, y, z = fleet.position[row].tolist()
-            vx, vy, vz = fleet.velocity[row].tolist()
-            pose = Pose((x, y, z), (vx, vy, vz), 0.0, float(charge[row]), bool(airborne[row]), seq)
             try:
-                self._socket.sendto(encode_pose(drone, pose), driver)
+                self._socket.sendto(encode_pose(drone, reports[row]), driver)
             except OSError:
                 self.rejected["unsent"] += 1
 

@@ -1,0 +1,78 @@
+"""What the links under a Zenoh bus must do when the network does not."""
+
+import json
+import os
+import socket
+import stat
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+import zenoh
+
+from deploy.launcher.ports import free_ports
+from shared.bus import ZenohBus
+from shared.net.settings import peer_settings
+from shared.topics import HAND
+from tests.contract.test_bus_contract import DEADLINE_S, collect, inbox_of, link
+
+
+@contextmanager
+def datagram_peer(*dialled: str, listen: str = "") -> Iterator[zenoh.Session]:
+    with zenoh.open(zenoh.Config.from_json5(json.dumps(peer_settings("swarm", listen, dialled)))) as session:
+        yield session
+
+
+def test_over_udp_what_must_not_be_lost_goes_by_tcp() -> None:
+    (port,) = free_ports(tcp=1, udp=0)[0]
+    where = f"udp/127.0.0.1:{port}"
+    with datagram_peer(listen=where), datagram_peer(where) as dialling:
+
+        def linked() -> dict[str, zenoh.Reliability | None]:
+            return {str(link.dst).partition("/")[0]: link.reliability for link in dialling.info.links()}
+
+        both = {"tcp": zenoh.Reliability.RELIABLE, "udp": zenoh.Reliability.BEST_EFFORT}
+        wait_for(lambda: linked() == both)
+
+
+def test_a_node_hears_although_every_datagram_of_its_joining_is_lost() -> None:
+    (port,) = free_ports(tcp=1, udp=0)[0]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as abyss:
+        abyss.bind(("127.0.0.1", port))
+        with (
+            ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{port}")) as sender,
+            ZenohBus(peer_settings("swarm", "", [f"udp/127.0.0.1:{port}"])) as receiver,
+        ):
+            inbox = inbox_of(receiver, HAND.key())
+            link(sender, receiver)
+            sender.publisher(HAND)(b"heard")
+            assert collect(inbox, 1) == {HAND.key(): [b"heard"]}
+        abyss.setblocking(False)
+        assert abyss.recv(65_536), "it was tried by datagram"
+
+
+def test_no_tcp_link_is_closed_with_a_wait() -> None:
+    """Zenoh sets SO_LINGER, and would hold up living links while it closes a dead one."""
+    (port,) = free_ports(tcp=1, udp=0)[0]
+    where = f"tcp/127.0.0.1:{port}"
+    with ZenohBus(peer_settings("swarm", where)), ZenohBus(peer_settings("swarm", "", [where])):
+        wait_for(lambda: lingers(port) == [0, 0])
+
+
+def lingers(port: int) -> list[int]:
+    """Returns SO_LINGER, 0 is off, of this process's ends of the connections with a port."""
+    found = []
+    for name in os.listdir("/dev/fd"):
+        with suppress(OSError):
+            if stat.S_ISSOCK(os.fstat(int(name)).st_mode):
+                with socket.socket(fileno=os.dup(int(name))) as end:
+                    if port in (end.getsockname()[1], end.getpeername()[1]):
+                        found.append(end.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER))
+    return found
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)

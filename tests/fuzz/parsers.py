@@ -1,0 +1,293 @@
+"""Every parser of the product, one row each. Their contract: a value or a `SwarmTouchError`, nothing else."""
+
+import gzip
+import json
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+import zenoh
+from attrs import frozen
+
+from agents.vehicles import sim
+from agents.vehicles.link import decode_order, decode_pose, encode_order, encode_pose
+from deploy.net.authority import issued
+from glove_bridge.calibration_file import SHIPPED, load_calibration
+from glove_bridge.framing import StreamDecoder
+from glove_bridge.framing import encode as frame
+from glove_bridge.gloves.serial import link_timing
+from glove_bridge.patterns import FOLDER, load_patterns
+from glove_bridge.protocol import Ping
+from glove_bridge.session import USB, Session
+from human_relay.pointing import PointerState, hear
+from human_relay.sources.pointer import pointer_address
+from human_relay.sources.recording import read_csv, relative_yaw
+from observer.console import protocol as page
+from observer.console.access import is_own_host, is_same_site, is_token
+from observer.console.pattern_file import read_patterns as read_page_patterns
+from observer.trace.read import open_trace
+from shared.codec import decode, encode
+from shared.config import SCENARIOS, load_scenario
+from shared.errors import SwarmTouchError
+from shared.flight_folder import read_meta, read_obstacles, read_patterns, read_track
+from shared.formation import build_formation
+from shared.net.audit import Audit
+from shared.net.keyring import Keyring
+from shared.net.settings import node_settings
+from shared.nodes import all_nodes, drone_node
+from shared.pointer_link import decode_pointed
+from shared.ros_bag import read_bag_tracks
+from shared.senses import Senses
+from shared.signature import blank, sign_with, verify_with
+from shared.topics import HAND, TOPICS, rank, topic_of
+from shared.transport import Arrival
+from shared.uri import parse_uri
+from tests.fuzz import seeds
+
+CORPUS = Path(__file__).parent / "corpus"
+"""Inputs that were findings once, or lead deep into a parser; a folder per row."""
+
+
+@frozen(kw_only=True)
+class Parser:
+    """One row.
+
+    Attributes:
+        name: For people, test ids and the folder in the corpus.
+        parse: Parses; raises nothing but `SwarmTouchError`.
+        seeds: Makes good inputs.
+        is_wire: Whether it takes bytes from a wire or a binary file: those are fuzzed with coverage, too.
+    """
+
+    name: str
+    parse: Callable[[bytes], object]
+    seeds: Callable[[], Iterable[bytes]]
+    is_wire: bool = False
+
+    def inputs(self) -> list[bytes]:
+        """Returns the good inputs and what is kept in the corpus."""
+        kept = sorted((CORPUS / self.name).glob("*"))
+        return [*self.seeds(), *(file.read_bytes() for file in kept)]
+
+    def accepts(self, data: bytes) -> bool:
+        """Parses and says whether it was a value; whatever is neither value nor refusal is raised."""
+        try:
+            self.parse(data)
+        except SwarmTouchError:
+            return False
+        return True
+
+
+def _in_file(name: str, read: Callable[[Path], object]) -> Callable[[bytes], object]:
+    """Makes a parser of bytes from a reader of files."""
+
+    def parse(data: bytes) -> object:
+        path = seeds.scratch() / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(data)
+        return read(path)
+
+    return parse
+
+
+def _argument(data: bytes) -> str:
+    """Decodes as the operating system hands over arguments and environment."""
+    return data.decode("utf-8", "surrogateescape")
+
+
+def _message(data: bytes) -> object:
+    refusals = []
+    for topic in TOPICS:
+        try:
+            message = decode(data, topic.kind)
+            assert decode(encode(message), topic.kind) == message
+        except SwarmTouchError as refusal:
+            refusals.append(refusal)
+    if len(refusals) == len(TOPICS):
+        raise refusals[0]
+    return refusals
+
+
+def _signed_hand(data: bytes) -> object:
+    """What an agent with keys makes of a payload on any of its keys, as it came and signed."""
+    senses = Senses((1, 2), verify_with(seeds.keys().hand_public))
+    senses.take({key: [Arrival(data, 5)] for key in (*senses.keys, "nonsense")})
+    assert senses.hand is None or data in seeds.hands(), "a hand that the relay has not signed"
+    signed = sign_with(seeds.keys().hand_private)(data + blank())
+    senses.take({HAND.key(): [Arrival(signed, 6)]})
+    return senses
+
+
+def _serial(data: bytes) -> object:
+    session = Session(USB, nonce=0)
+    session.opened(0)
+    for half in (data[: len(data) // 2], data[len(data) // 2 :]):
+        session.receive(half, 1)
+        session.due(2)
+    heard = StreamDecoder().feed(data + frame(Ping(9)))
+    assert heard[-1] == Ping(9), "garbage has cost the message after it"
+    return [frame(message) for message in heard]
+
+
+def _vehicle(data: bytes) -> object:
+    with suppress(SwarmTouchError):
+        return encode_order(*decode_order(data))
+    return encode_pose(*decode_pose(data))
+
+
+def _trace(path: Path) -> object:
+    trace = open_trace(path)
+    return list(trace.records()), list(trace.messages()), trace.faults
+
+
+def _scenario(path: Path) -> object:
+    scenario = load_scenario(path)
+    formation = build_formation(scenario)
+    return [node_settings(scenario, formation, node) for node in all_nodes(formation)[:3]]
+
+
+def _endpoint(data: bytes) -> object:
+    """An endpoint, the radio's group and its interface become Zenoh's configuration."""
+    text = json.dumps(data.decode(errors="replace"))
+    keys = ("net.endpoints.relay", "net.multicast", "net.interface")
+    scenario = load_scenario("rhombus", [*(f"{key}={text}" for key in keys), "net.profile=radio"])
+    for settings in node_settings(scenario, build_formation(scenario), drone_node(1)):
+        with suppress(zenoh.ZError):  # `shared.bus` makes a `DeviceError` of it
+            zenoh.Config.from_json5(json.dumps(settings))
+    return scenario
+
+
+def _uri(data: bytes) -> object:
+    uri = parse_uri(_argument(data), example="pointer://")
+    uri.number("speed", 1.0, low=0.0, high=4.0)
+    return [part(uri) for part in (pointer_address, link_timing)]
+
+
+def _headers(data: bytes) -> object:
+    text = data.decode("latin-1")
+    return (
+        is_own_host(text, ["here"]),
+        is_same_site(text, "localhost:8080"),
+        is_token(_argument(data), "secret"),
+    )
+
+
+def _key(data: bytes) -> object:
+    text = data.decode(errors="replace")
+    return rank(text), topic_of(text)
+
+
+def _zenoh_log(data: bytes) -> object:
+    audit = Audit(["drone/1"])
+    audit.read(data.decode(errors="replace"))
+    return audit.report(10**10), audit.metrics()
+
+
+def _certificate(path: Path) -> object:
+    (path.parent / "members.toml").write_text("members = []", encoding="ascii")
+    return issued(Keyring(path.parent))
+
+
+_Wire = partial(Parser, is_wire=True)
+
+PARSERS = (
+    _Wire(name="message", parse=_message, seeds=seeds.messages),
+    _Wire(name="signed-hand", parse=_signed_hand, seeds=seeds.hands),
+    _Wire(name="serial", parse=_serial, seeds=seeds.frames),
+    _Wire(name="vehicle", parse=_vehicle, seeds=seeds.vehicle_datagrams),
+    _Wire(
+        name="pointer",
+        parse=lambda data: hear(PointerState(moved_ns=0), decode_pointed(data), 1),
+        seeds=seeds.pointers,
+    ),
+    _Wire(name="page", parse=page.parse, seeds=seeds.page_messages),
+    _Wire(name="key", parse=_key, seeds=lambda: [b"human/hand", b"drone/12/state", b"status/relay/0"]),
+    _Wire(name="zenoh-log", parse=_zenoh_log, seeds=lambda: [seeds.ZENOH_LOG]),
+    _Wire(name="trace", parse=_in_file("trace.mcap", _trace), seeds=seeds.traces),
+    Parser(
+        name="scenario",
+        parse=_in_file("scenario.toml", _scenario),
+        seeds=lambda: seeds.files(*sorted(SCENARIOS.glob("*.toml"))),
+    ),
+    Parser(
+        name="override",
+        parse=lambda data: load_scenario("rhombus", [_argument(data)]),
+        seeds=lambda: seeds.OVERRIDES,
+    ),
+    Parser(
+        name="scenario-name",
+        parse=lambda data: load_scenario(_argument(data)),
+        seeds=lambda: [b"rhombus", b"line"],
+    ),
+    Parser(name="endpoint", parse=_endpoint, seeds=lambda: [b"tcp/10.0.0.1:7447", b"udp/224.0.0.1:7#iface=lo"]),
+    Parser(name="uri", parse=_uri, seeds=lambda: seeds.URIS[:1]),
+    Parser(
+        name="vehicle-uri",
+        parse=lambda data: sim.parse_uri(_argument(data)),
+        seeds=lambda: [b"sim://127.0.0.1:7400/2", b"sim://[::1]:7400/2"],
+    ),
+    Parser(
+        name="headers",
+        parse=_headers,
+        seeds=lambda: [b"localhost:8080", b"http://localhost:8080", b"[::1]:80", b"secret"],
+    ),
+    Parser(
+        name="calibration",
+        parse=_in_file("calibration.toml", load_calibration),
+        seeds=lambda: seeds.files(SHIPPED),
+    ),
+    Parser(
+        name="patterns",
+        parse=_in_file("patterns.toml", load_patterns),
+        seeds=lambda: seeds.files(*sorted(FOLDER.glob("*.toml"))),
+    ),
+    Parser(
+        name="page-patterns",
+        parse=_in_file("patterns.json", read_page_patterns),
+        seeds=lambda: [json.dumps(seeds.PAGE_PATTERNS).encode()],
+    ),
+    Parser(
+        name="members",
+        parse=_in_file("members/members.toml", lambda path: Keyring(path.parent).members()),
+        seeds=lambda: seeds.files(seeds.keys().folder / "members.toml"),
+    ),
+    Parser(
+        name="hand-public-key",
+        parse=_in_file("hand.pub", verify_with),
+        seeds=lambda: seeds.files(seeds.keys().hand_public),
+    ),
+    Parser(
+        name="hand-private-key",
+        parse=_in_file("hand.key", sign_with),
+        seeds=lambda: seeds.files(seeds.keys().hand_private),
+    ),
+    Parser(
+        name="certificate",
+        parse=_in_file("issued/relay.crt", _certificate),
+        seeds=lambda: seeds.files(seeds.keys().authority, seeds.keys().certificate("relay")),
+    ),
+    Parser(name="flight-track", parse=_in_file("glove.csv", read_track), seeds=lambda: [seeds.TRACK]),
+    Parser(name="flight-track-packed", parse=_in_file("glove.csv.gz", read_track), seeds=seeds.tracks),
+    Parser(
+        name="flight-patterns",
+        parse=_in_file("pattern_topic.csv.gz", lambda path: read_patterns(path.parent)),
+        seeds=lambda: [gzip.compress(b"t_bag_ns,name\n1,\n2,extended_left\n", mtime=0)],
+    ),
+    Parser(
+        name="flight-obstacles",
+        parse=_in_file("obstacles.csv", lambda path: read_obstacles(path.parent)),
+        seeds=lambda: [b"name,median_x,median_y\na,1.0,2.0\nb,-1,0\n"],
+    ),
+    Parser(
+        name="flight-meta",
+        parse=_in_file("meta.json", lambda path: read_meta(path.parent)),
+        seeds=lambda: [json.dumps(seeds.META).encode()],
+    ),
+    Parser(
+        name="hand-csv",
+        parse=_in_file("hand.csv", lambda path: relative_yaw(read_csv(path).quaternion)),
+        seeds=lambda: [b"t,x,y,z,yaw\n0,0,0,1,0\n0.1,0,0,1,0.1\n", b"t,x,y,z\n0,0,0,1\n1,0,0,1\n"],
+    ),
+    Parser(name="bag", parse=_in_file("hand.bag", read_bag_tracks), seeds=seeds.bags),
+)

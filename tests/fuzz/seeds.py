@@ -1,0 +1,145 @@
+"""Good inputs of every parser, made by the product itself, so they never go out of date."""
+
+import gzip
+import json
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_typestore
+
+from agents.vehicles.base import Pose
+from agents.vehicles.link import Verb, encode_order, encode_pose
+from deploy.net.authority import create, issue
+from glove_bridge.framing import encode as frame
+from glove_bridge.protocol import PROTOCOL, Ack, Hello, HelloReply, Ping, Play, PlayFrame, Set, Status, Stop
+from shared import pointer_link
+from shared.codec import encode
+from shared.messages import FormationState, PatternEvent, ProcessStatus
+from shared.net.keyring import Keyring
+from shared.nodes import drone_node
+from shared.ros_bag import TRANSFORM
+from shared.signature import blank, sign_with
+from tests.traces import flight, hand, state, write
+
+ZENOH_LOG = (
+    b"TRACE ThreadId(14) zenoh::access_control: 3551f63a5eee is unauthorized to Put (ingress) on s/human/hand\n"
+    b"TRACE rx-1 ThreadId(14) zenoh::net::routing::interceptor: Msg intercepted!\n"
+    b'WARN acc-0 zenoh_link_commons: QUIC acceptor failed: reason: "invalid peer certificate: BadSignature"\n'
+)
+TRACK = b"t_ns,x,y,z,qx,qy,qz,qw\n1,0,0,1,0,0,0,1\n2,0.1,0,1,0,0,0,1\n"
+META = {"limits_x": [-2, 2], "limits_y": [-2, 2], "base_offset_c": [0.1, 0], "pos_coef": 2.0, "l": 0.4}
+META |= {"triangle_height_factor": 0.86, "R_obstacles": 0.27, "run": "one"}
+PAGE_PATTERNS = {"frames": {"EI": [{"ms": 200, "hz": {"3": 150.0}}]}, "cues": ["FENCE"]}
+OVERRIDES = (b"formation.n=8", b'net.endpoints."drone/2"=tcp/10.0.0.2:7447', b"hand.home=[1.0, 2.0]")
+URIS = (b"pointer://127.0.0.1:7459?speed=0.5", b"serial:///dev/ttyACM0?baud=115200", b"recording:a%20b?lead=2")
+
+
+@cache
+def scratch() -> Path:
+    """Returns a folder for the life of the process, in memory where there is such a place."""
+    memory = Path("/dev/shm")  # noqa: S108  a folder of its own is made in it
+    folder = tempfile.TemporaryDirectory(dir=memory if memory.is_dir() else None)
+    _kept.append(folder)
+    return Path(folder.name)
+
+
+_kept: list[object] = []
+
+
+@cache
+def keys() -> Keyring:
+    """Makes keys for the life of the process."""
+    made = Keyring(scratch() / "keys")
+    create(made, "rhombus")
+    for node in ("relay", drone_node(1)):
+        issue(made, node)
+    return made
+
+
+def files(*paths: Path) -> list[bytes]:
+    """Reads files."""
+    return [path.read_bytes() for path in paths]
+
+
+def messages() -> list[bytes]:
+    """Makes one message of every topic."""
+    envelope: Any = {"epoch": 7, "seq": 3, "stamp_ns": 9}
+    formation = FormationState(
+        **envelope, area=0.5, area_ratio=1.0, distances={"1-2": 0.7}, extent=0, trend=-1, displacement=0.0
+    )
+    event = PatternEvent(**envelope, pattern="EI", outcome="finished", state_seq=5)
+    status = ProcessStatus(**envelope, role="drone", id=1, pid=2, host="here", state="running")
+    return [encode(message) for message in (hand(1), state(2, 3), formation, event, status)]
+
+
+@cache
+def hands() -> list[bytes]:
+    """Makes hand samples: to be signed, signed, and unsigned."""
+    sample = encode(hand(1, signature=blank()))
+    return [sample, sign_with(keys().hand_private)(sample), encode(hand(2))]
+
+
+def frames() -> list[bytes]:
+    """Makes one frame of every message on the glove's line."""
+    steps = (PlayFrame(200, (0, 0, 130, 0, 0)), PlayFrame(300, (191, 0, 0, 0, 191)))
+    replies = (Ack(7, Status.OK, 500, 0), HelloReply(1, PROTOCOL, (1, 0), 9, 5, 32, 10_000, 350))
+    commands = (Hello(0, 9, 350), Set(1, (1, 2, 3, 4, 5)), Play(2, steps), Stop(3), Ping(4))
+    return [frame(message) for message in (*replies, *commands)]
+
+
+def vehicle_datagrams() -> list[bytes]:
+    """Makes one datagram towards the world and one from it."""
+    pose = Pose((1.0, 2.0, 3.0), (0.0, 0.1, 0.0), 0.5, 0.9, True, 4)
+    return [encode_order(2, Verb.FLY, (1.0, 2.0, 3.0)), encode_pose(2, pose)]
+
+
+def pointers() -> list[bytes]:
+    """Makes one datagram of every verb."""
+    pointed = (pointer_link.Pointed(5, verb, (1.0, 0.0, 1.5), 0.1) for verb in pointer_link.Verb)
+    return [pointer_link.encode_pointed(each) for each in pointed]
+
+
+def page_messages() -> list[bytes]:
+    """Makes every message of a page."""
+    moves = ({"type": "hand", "point": [1.0, -2.0, 1.5], "yaw": 0.1}, {"type": "wish", "wish": "STOP"})
+    others = ({"type": "take"}, {"type": "release"}, {"type": "give", "to": 2})
+    return [json.dumps(message).encode() for message in (*moves, *others)]
+
+
+def traces() -> list[bytes]:
+    """Makes a whole trace, and one that a killed recorder has left."""
+    with tempfile.TemporaryDirectory() as folder:
+        return files(*(write(Path(folder), flight(12), close=close) for close in (True, False)))
+
+
+def tracks() -> list[bytes]:
+    """Makes a packed table of a recorded body."""
+    return [gzip.compress(TRACK, mtime=0)]
+
+
+def bags() -> list[bytes]:
+    """Makes a ROS 1 bag with two poses of a hand."""
+    types = get_typestore(Stores.ROS1_NOETIC)
+    kind = types.types
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "hand.bag"
+        with Writer(path) as bag:
+            topic = bag.add_connection("/vicon/glove/glove", TRANSFORM, typestore=types)
+            for second in (1, 2):
+                message = kind[TRANSFORM](
+                    header=kind["std_msgs/msg/Header"](
+                        seq=second,
+                        stamp=kind["builtin_interfaces/msg/Time"](sec=second, nanosec=0),
+                        frame_id="world",
+                    ),
+                    child_frame_id="glove",
+                    transform=kind["geometry_msgs/msg/Transform"](
+                        translation=kind["geometry_msgs/msg/Vector3"](x=1.0, y=0.0, z=1.5),
+                        rotation=kind["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+                    ),
+                )
+                bag.write(topic, second * 10**9, types.serialize_ros1(message, TRANSFORM))
+        return files(path)

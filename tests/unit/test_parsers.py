@@ -1,0 +1,63 @@
+"""Every parser of the table: its good inputs are good, and no bytes get more out of it than a refusal."""
+
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.fuzz.parsers import CORPUS, PARSERS, Parser
+
+NASTY = (
+    *(
+        b"9" * 20,
+        b"9" * 400,
+        b"9" * 5000,
+        b"-1",
+        b"1e999",
+        b"nan",
+        b"inf",
+        b"[" * 3000,
+        b"{" * 3000,
+        b'{"a":' * 2000,
+    ),
+    *(b"\0", b"\xff\xfe", b"\xed\xa0\x80", b"\r\n", b"=", b"[[", b'"', b"'''", b",,", b"%00", b"//", b"[::1"),
+)
+"""What parsers stumble over."""
+
+
+_WORD = re.compile(rb"[\w.+-]+|\W")
+
+
+@st.composite
+def spoilt(draw: st.DrawFn, good: list[bytes]) -> bytes:
+    """Makes a good input with words left out, doubled, or replaced by something nasty."""
+    words = _WORD.findall(draw(st.sampled_from(good)))
+    for _ in range(draw(st.integers(1, 3))):
+        at = draw(st.integers(0, len(words) - 1))
+        new = draw(st.sampled_from(NASTY) | st.sampled_from((b"", words[at] * 2)) | st.binary(max_size=8))
+        words[at : at + draw(st.sampled_from((1, 1, 1, 8)))] = [new]
+    return b"".join(words)
+
+
+@pytest.mark.parametrize("parser", PARSERS, ids=lambda parser: parser.name)
+def test_good_inputs_are_good_and_the_corpus_holds(parser: Parser) -> None:
+    assert all(parser.accepts(data) for data in parser.seeds())
+    for data in parser.inputs():
+        parser.accepts(data)
+
+
+@pytest.mark.parametrize("parser", PARSERS, ids=lambda parser: parser.name)
+def test_whatever_comes_in_is_a_value_or_a_refusal(parser: Parser) -> None:
+    good = parser.inputs()
+
+    @settings(max_examples=200)
+    @given(data=spoilt(good) | st.binary(max_size=300) | st.sampled_from(NASTY))
+    def check(data: bytes) -> None:
+        parser.accepts(data)
+
+    check()
+
+
+def test_the_corpus_belongs_to_parsers() -> None:
+    assert {folder.name for folder in CORPUS.iterdir()} <= {parser.name for parser in PARSERS}
