@@ -1,6 +1,8 @@
 """Messages to bytes and back: MessagePack maps, strict on the way in.
 
-cattrs alone would accept NaN, `"1.5"`, `True` as a number or a string as a vector; the hooks here refuse them.
+What is valid is decoded by msgspec, in C, in a fifth of the time that Python takes. What it does not take is
+looked at again, field by field, by hooks for cattrs that know why: they have the last word, they alone refuse.
+(cattrs by itself would accept NaN, `"1.5"`, `True` as a number or a string as a vector.)
 Unknown extra fields are ignored (a newer publisher may say more), a missing or wrong one is not.
 """
 
@@ -12,18 +14,17 @@ from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
 
 import attrs
 import msgpack
+import msgspec
 from cattrs import Converter
 
 from shared.errors import DecodeError
-from shared.messages import SCHEMA_VERSION, Flag, Heard, Message, Mode, Range, UInt64, Wish
+from shared.messages import SCHEMA_VERSION, Flag, Heard, Message, Mode, UInt64, Wish
 
 MAX_PAYLOAD = 4096
 """Largest payload in bytes that is looked at at all."""
 
 M = TypeVar("M", bound=Message)
 Hook = Callable[[Any, Any], Any]
-
-_KNOWN_FLAGS = sum(Flag)
 
 
 def encode(message: Message, stamp_ns: int | None = None) -> bytes:
@@ -64,6 +65,35 @@ def decode(payload: bytes, kind: type[M]) -> M:
     """
     if len(payload) > MAX_PAYLOAD:
         raise DecodeError("oversized", f"{len(payload)} bytes, at most {MAX_PAYLOAD}")
+    message = decode_valid(payload, kind)
+    return decode_strictly(payload, kind) if message is None else message
+
+
+class _Envelope(msgspec.Struct):
+    """The one field that no message declares."""
+
+    v: Annotated[int, msgspec.Meta(ge=SCHEMA_VERSION, le=SCHEMA_VERSION)]
+
+
+_version = msgspec.msgpack.Decoder(_Envelope)
+
+
+@functools.cache
+def _decoder(kind: Any) -> msgspec.msgpack.Decoder[Any]:
+    return msgspec.msgpack.Decoder(kind)
+
+
+def decode_valid(payload: bytes, kind: type[M]) -> M | None:
+    """Decodes what is right at first sight, None for anything that is not."""
+    try:
+        _version.decode(payload)
+        return cast(M, _decoder(cast(Any, kind)).decode(payload))
+    except Exception:  # noqa: BLE001  whatever it is, the strict decoder has the last word
+        return None
+
+
+def decode_strictly(payload: bytes, kind: type[M]) -> M:
+    """Decodes field by field; arguments and errors as for `decode`."""
     try:
         fields = msgpack.unpackb(payload, use_list=False)
     except Exception as error:
@@ -118,12 +148,6 @@ def _flags(value: Any, _: Any) -> Flag:
     bits = _integer(value)
     if bits < 0 or bits > 0xFFFF_FFFF:
         raise DecodeError("out-of-range", f"flags {bits}")
-    # A newer publisher may set flags that we do not know: keep those that we do.
-    return _known_flags(bits & _KNOWN_FLAGS)
-
-
-@functools.cache
-def _known_flags(bits: int) -> Flag:
     return Flag(bits)
 
 
@@ -141,33 +165,32 @@ def _word_hook(kind: type[enum.StrEnum]) -> Hook:
 
 
 def _ranged_hook(annotated: Any) -> Hook:
-    """Makes the hook of an `Annotated[number or vector, Range(...)]`."""
+    """Makes the hook of an `Annotated[number, Meta(...)]`."""
     base, bounds = get_args(annotated)[:2]
-    low, high = bounds
+    low, high = bounds.ge, math.inf if bounds.le is None else bounds.le
     scalar = _integer if base is int else _number
 
     def number(value: Any, _: Any) -> Any:
-        if type(value) is base and low <= value <= high:
-            return value  # the common case, and NaN compares false
         checked = scalar(value)
         if not low <= checked <= high:
             raise DecodeError("out-of-range", f"{checked!r} not in [{low}, {high}]")
         return checked
 
-    def vector(value: Any, _: Any) -> tuple[float, ...]:
+    return number
+
+
+def _vector_hook(kind: Any) -> Hook:
+    """Makes the hook of a `tuple[number, number, number]`."""
+    element = get_args(kind)[0]
+    hook = _converter.get_structure_hook(element)
+
+    def vector(value: Any, _: Any) -> tuple[float, float, float]:
         if type(value) is not tuple or len(value) != 3:
             raise DecodeError("wrong-type", f"three numbers are expected, not {value!r:.40}")
         x, y, z = value
-        if (
-            type(x) is type(y) is type(z) is float
-            and low <= x <= high
-            and low <= y <= high
-            and low <= z <= high
-        ):
-            return value
-        return (number(x, float), number(y, float), number(z, float))
+        return (hook(x, element), hook(y, element), hook(z, element))
 
-    return vector if get_origin(base) is tuple else number
+    return vector
 
 
 def _heard(value: Any, _: Any) -> Heard:
@@ -207,7 +230,11 @@ _unsigned = _ranged_hook(UInt64)
 
 
 def _is_sequence(kind: Any) -> bool:
-    return get_origin(kind) is tuple
+    return get_origin(kind) is tuple and ... in get_args(kind)
+
+
+def _is_vector(kind: Any) -> bool:
+    return get_origin(kind) is tuple and len(get_args(kind)) == 3
 
 
 def _is_mapping(kind: Any) -> bool:
@@ -215,7 +242,7 @@ def _is_mapping(kind: Any) -> bool:
 
 
 def _is_ranged(kind: Any) -> bool:
-    return get_origin(kind) is Annotated and isinstance(get_args(kind)[1], Range)
+    return get_origin(kind) is Annotated and isinstance(get_args(kind)[1], msgspec.Meta)
 
 
 def _make_converter() -> Converter:
@@ -226,6 +253,7 @@ def _make_converter() -> Converter:
     converter.register_structure_hook(bytes, _binary)
     converter.register_structure_hook_factory(_is_ranged, _ranged_hook)
     converter.register_structure_hook_factory(_is_sequence, _sequence_hook)
+    converter.register_structure_hook_factory(_is_vector, _vector_hook)
     converter.register_structure_hook_factory(_is_mapping, _mapping_hook)
     converter.register_structure_hook_func(lambda kind: kind is Heard, _heard)
     # By class, because a hook for `str` or `int` would also take their subclasses and leave a bare string.

@@ -6,9 +6,11 @@ Every message carries an envelope: `epoch` (the publisher's start, ns; a restart
 """
 
 import enum
-from typing import Annotated, NamedTuple
+import sys
+from typing import Annotated, Any, NamedTuple
 
 from attrs import Factory, field, frozen
+from msgspec import Meta
 
 SCHEMA_VERSION = 1
 
@@ -17,21 +19,18 @@ MAX_VELOCITY = 50.0
 MAX_DRONE_ID = 65_535
 
 
-class Range(NamedTuple):
-    """Closed interval that a decoded number (or every element of a vector) must lie in."""
-
-    low: float
-    high: float
-
-
 Vector = tuple[float, float, float]
-Position = Annotated[Vector, Range(-MAX_POSITION, MAX_POSITION)]
-Velocity = Annotated[Vector, Range(-MAX_VELOCITY, MAX_VELOCITY)]
-Angle = Annotated[float, Range(-1_000.0, 1_000.0)]
-Seconds = Annotated[float, Range(0.0, 1e9)]
-Fraction = Annotated[float, Range(0.0, 1.0)]
-UInt64 = Annotated[int, Range(0, 2**64 - 1)]
-DroneId = Annotated[int, Range(1, MAX_DRONE_ID)]
+Coordinate = Annotated[float, Meta(ge=-MAX_POSITION, le=MAX_POSITION)]
+Position = tuple[Coordinate, Coordinate, Coordinate]
+Speed = Annotated[float, Meta(ge=-MAX_VELOCITY, le=MAX_VELOCITY)]
+Velocity = tuple[Speed, Speed, Speed]
+Angle = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
+Seconds = Annotated[float, Meta(ge=0.0, le=1e9)]
+Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
+Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
+UInt64 = Annotated[int, Meta(ge=0)]
+"""MessagePack has no larger integers."""
+DroneId = Annotated[int, Meta(ge=1, le=MAX_DRONE_ID)]
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
@@ -74,6 +73,16 @@ class Flag(enum.IntFlag):
     REFERENCE_LOST = 256
     REJECTED_INPUT = 512
     AVOIDING = 1024
+
+    @classmethod
+    def _missing_(cls, value: object) -> Any:
+        """Keeps the flags that we know of a number of 32 bits: a newer publisher may set others."""
+        if not (isinstance(value, int) and 0 <= value < 2**32):
+            raise ValueError(f"flags {value!r}")
+        return super()._missing_(value & _KNOWN_FLAGS)
+
+
+_KNOWN_FLAGS = sum(flag.value for flag in Flag)
 
 
 class Heard(NamedTuple):
@@ -168,9 +177,9 @@ class FormationState(Message):
     area: Seconds
     area_ratio: Seconds
     distances: dict[str, Seconds]
-    extent: Annotated[int, Range(-1, 1)]
-    trend: Annotated[int, Range(-1, 1)]
-    displacement: Annotated[float, Range(-MAX_POSITION, MAX_POSITION)]
+    extent: Annotated[int, Meta(ge=-1, le=1)]
+    trend: Annotated[int, Meta(ge=-1, le=1)]
+    displacement: Coordinate
     missing: tuple[DroneId, ...] = ()
     heard: dict[str, Heard] = Factory(dict)
 
@@ -214,7 +223,7 @@ class ProcessStatus(Message):
     """
 
     role: str
-    id: Annotated[int, Range(0, MAX_DRONE_ID)]
+    id: Annotated[int, Meta(ge=0, le=MAX_DRONE_ID)]
     pid: UInt64
     host: str
     state: str
@@ -222,4 +231,4 @@ class ProcessStatus(Message):
     cpu: Seconds = 0.0
     rss_mb: Seconds = 0.0
     rejected: dict[str, UInt64] = field(factory=dict)
-    metrics: dict[str, float] = field(factory=dict)
+    metrics: dict[str, Finite] = field(factory=dict)

@@ -11,9 +11,10 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import attrs
 import msgpack
+from msgspec import Meta
 
 from shared.codec import encode
-from shared.messages import SCHEMA_VERSION, Message, Range
+from shared.messages import SCHEMA_VERSION, Message
 
 Schema = dict[str, Any]
 
@@ -106,7 +107,6 @@ def _array(kinds: tuple[Any, ...]) -> Schema:
     return schema
 
 
-def _bounded(schema: Schema, bounds: Range) -> Schema:
-    if schema["type"] == "array":
-        return {**schema, "items": _bounded(schema["items"], bounds)}
-    return {**schema, "minimum": bounds.low, "maximum": bounds.high}
+def _bounded(schema: Schema, bounds: Meta) -> Schema:
+    limits = {"minimum": bounds.ge, "maximum": bounds.le}
+    return {**schema, **{name: limit for name, limit in limits.items() if limit is not None}}

@@ -23,11 +23,11 @@ def main() -> int:
     rows: list[Row] = []
     for name in arguments.plans or PLANS:
         rows.append(PLANS[name](arguments.logs / name))
-        console.print(f"{name}: {', '.join(rows[-1].failures) or 'as designed'}")
+        console.print(f"{name}: {', '.join((*rows[-1].failures, *rows[-1].late)) or 'as designed'}")
     print_table(rows, console)
     if arguments.csv:
         write_csv(rows, arguments.csv)
-    return 1 if any(row.failures for row in rows) else 0
+    return 1 if any(row.failures or row.late for row in rows) else 0
 
 
 def _parse() -> argparse.Namespace:

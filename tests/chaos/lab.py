@@ -4,6 +4,7 @@
 recorder's way in, by which it hears every node whatever happens to the mesh.
 """
 
+import fcntl
 import json
 import os
 import shutil
@@ -21,6 +22,7 @@ from tests.chaos.weather import Weather
 PREFIX = "chaos-"
 SWITCH = f"{PREFIX}switch"
 UPLINK = "chaos-up"
+LOCK = "/run/chaos.lock"
 MESH, AIR = "10.77.0", "10.78.0"
 INSTALL = "apt-get install iproute2 iptables"
 
@@ -46,6 +48,14 @@ def _run(*command: str) -> str:
     return done.stdout
 
 
+def _sweep() -> None:
+    # A namespace goes when the kernel gets round to it, and its end of the cable with it: do not wait.
+    if Path(f"/sys/class/net/{UPLINK}").exists():
+        _run("ip", "link", "del", UPLINK)
+    for space in Path("/run/netns").glob(f"{PREFIX}*"):
+        _run("ip", "netns", "del", space.name)
+
+
 class Lab:
     """The namespaces of one flight.
 
@@ -57,7 +67,10 @@ class Lab:
     def __init__(self, nodes: Sequence[str], *, emulated: bool = False) -> None:
         self._number = {node: 10 + index for index, node in enumerate(nodes)}
         self._emulator: subprocess.Popen[str] | None = None
-        self.close()  # what an earlier run that was killed has left
+        # One lab at a time on a machine: the names of its namespaces and the addresses in them are fixed.
+        self._alone = open(LOCK, "ab")  # noqa: SIM115  held until the lab is closed
+        fcntl.flock(self._alone, fcntl.LOCK_EX)
+        _sweep()  # what an earlier run that was killed has left
         try:
             self._build_air()
             if emulated:
@@ -125,15 +138,13 @@ class Lab:
 
     def close(self) -> None:
         """Removes everything; may be called twice."""
+        if self._alone.closed:
+            return
         if self._emulator is not None:
             with suppress(OSError):
                 self._emulator.communicate(timeout=5.0)
-            self._emulator = None
-        # A namespace goes when the kernel gets round to it, and its end of the cable with it: do not wait.
-        if Path(f"/sys/class/net/{UPLINK}").exists():
-            _run("ip", "link", "del", UPLINK)
-        for space in Path("/run/netns").glob(f"{PREFIX}*"):
-            _run("ip", "netns", "del", space.name)
+        _sweep()
+        self._alone.close()
 
     def __enter__(self) -> Self:
         return self

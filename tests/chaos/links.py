@@ -4,53 +4,59 @@ from pathlib import Path
 
 from shared.messages import Flag, Mode
 from shared.nodes import RELAY, WORLD, drone_node
-from shared.topics import HAND
+from shared.topics import DRONE_STATE, HAND
 from tests.chaos.flight import chaos_flight
 from tests.chaos.row import Row, judge
-from tests.chaos.steps import REJOIN_S, Fly, all_follow, only, wait, watch_from_now, within
+from tests.chaos.steps import REJOIN_S, Fly, all_follow, only, wait, watch_from_now
 from tests.chaos.watch import Watch, references
 from tests.chaos.weather import Weather
 
 FRESH_S = 0.3
-"""No data between healthy nodes is ever older."""
+"""No data between healthy nodes is ever older ..."""
+STALLED_S = 2.0
+"""... and if it is that old, no busy machine is the reason."""
 HEALED_S = 2.0
+"""The swarm follows again so soon after a partition."""
 BAD_WEATHER = Weather(delay=0.05, jitter=0.02, loss=0.2, duplicate=0.05)
 WORSE = 1.15
 """How much worse the swarm may follow in bad weather."""
 
 
-def partition(seconds: float) -> Fly:
+def partition(seconds: float, protocol: str) -> Fly:
     """Parts the human and drone 1 from the rest."""
 
     def fly(folder: Path) -> Row:
-        with chaos_flight(folder, protocol="udp") as flight:
+        with chaos_flight(folder, protocol=protocol) as flight:
             recorder, lab = flight.recorder, flight.lab
             rest = tuple(drone for drone in flight.ids if drone != 1)
             watch = Watch(flight, recorder.clock(), rest)
+            leader = Watch(flight, watch.start_ns, (1,))
             lab.part((RELAY, drone_node(1)), [node for node in flight.nodes if node not in (RELAY, "drone/1")])
             recorder.listen(seconds)
             modes = {recorder.latest(drone).mode for drone in rest}
             drift = watch.drift(rest, (2.0, min(seconds, 9.5)))
+            led = only(leader, Mode.FOLLOW)
             lab.heal()
             landed = seconds > 10.0
             designed = {Mode.LAND, Mode.GROUND} if landed else {Mode.HOLD}
-            normal = (lambda: recorder.all_in(Mode.GROUND, rest)) if landed else (lambda: all_follow(flight))
-            back = wait(flight, normal, 8.0)
+            back = wait(flight, lambda: recorder.all_in(Mode.GROUND, rest) if landed else all_follow(flight))
             recorder.listen(2.0)
-            ages = watch.ages([pair for pair in references(flight.formation, rest) if pair[0] != HAND.key()])
-            down = all(recorder.latest(drone).mode is Mode.GROUND for drone in rest)
+            mates = [pair for pair in references(flight.formation, rest) if pair[0] != HAND.key()]
+            ages = leader.ages([*mates, (HAND.key(), 1)])
             return judge(
-                f"part human and 1 from the rest, {seconds:.0f} s",
+                f"part human and 1 from the rest, {seconds:.0f} s, {protocol}",
                 watch,
                 recovered_s=back,
                 demands=[
-                    (
-                        modes <= designed,
-                        "HOLD, or LAND after 10 s",
-                    ),
+                    (modes <= designed, "HOLD, or LAND after 10 s"),
+                    (led, "drone 1 follows its hand"),
                     (drift <= 0.3, "drift of at most 0.3 m"),
-                    (down if landed else within(back, HEALED_S), "down for good, or FOLLOW within 2 s"),
-                    (ages.max() < FRESH_S, "data between healthy nodes younger than 0.3 s"),
+                    (not landed or all(recorder.latest(i).mode is Mode.GROUND for i in rest), "down for good"),
+                    (ages.max() < STALLED_S, "no link between healthy nodes stalls"),
+                ],
+                times=[
+                    *([] if landed else [(back, HEALED_S, "FOLLOW within 2 s")]),
+                    (ages.max(), FRESH_S, "data between healthy nodes younger than 0.3 s"),
                 ],
                 notes=[f"drift {drift:.2f} m, oldest data between healthy nodes {1e3 * ages.max():.0f} ms"],
             )
@@ -66,17 +72,45 @@ def lose_packets(folder: Path) -> Row:
         flight.recorder.listen(10.0)
         flight.lab.heal()
         ages = watch.ages(references(flight.formation, flight.ids))
-        back = wait(flight, lambda: all_follow(flight), 2.0)
+        back = wait(flight, lambda: all_follow(flight))
         flight.recorder.listen(1.5)
         return judge(
             "lose 20 % for 10 s",
             watch,
             recovered_s=back,
-            demands=[
-                (only(watch, Mode.FOLLOW), "no wrong failsafe"),
-                (ages.max() < FRESH_S, "data younger than 0.3 s"),
-            ],
+            demands=[(only(watch, Mode.FOLLOW), "no wrong failsafe")],
+            times=[(ages.max(), FRESH_S, "data younger than 0.3 s")],
             notes=[f"oldest data {1e3 * ages.max():.0f} ms"],
+        )
+
+
+def rejoin_in_bad_weather(folder: Path) -> Row:
+    """Kills drone 2 in bad weather and starts it again: every other must hear it, and it every other."""
+    with chaos_flight(folder, "scripted:hold", emulated=True, protocol="udp") as flight:
+        flight.lab.weather(BAD_WEATHER)
+        flight.recorder.listen(1.0)
+        watch = watch_from_now(flight, (2,))
+        flight.kill("drone/2")
+        flight.start("drone/2")
+
+        def joined() -> bool:
+            """It hears the hand and its reference, and who refers to it hears it anew."""
+            epoch, heard = flight.recorder.latest(2).epoch, flight.recorder.latest(4).heard
+            return (
+                epoch > watch.start_ns
+                and heard[DRONE_STATE.key(id=2)].epoch == epoch
+                and {HAND.key(), DRONE_STATE.key(id=1)} <= flight.recorder.latest(2).heard.keys()
+                and all_follow(flight)
+            )
+
+        back = wait(flight, joined)
+        flight.recorder.listen(1.5)
+        return judge(
+            "kill -9 drone 2, restarted in that weather",
+            watch,
+            recovered_s=back,
+            demands=[(only(watch, Mode.FOLLOW, Mode.HOLD), "the others fly on")],
+            times=[(back, REJOIN_S, "all back in 12 s")],
         )
 
 
@@ -89,15 +123,16 @@ def silence_vehicle(folder: Path) -> Row:
         flight.lab.silence(drone_node(4), WORLD)
         flight.recorder.listen(2.0)
         flight.lab.heal()
-        back = wait(flight, lambda: all_follow(flight), REJOIN_S)
+        back = wait(flight, lambda: all_follow(flight))
         flight.recorder.listen(1.5)
         return judge(
             "no pose of drone 4 for 2 s",
             watch,
             recovered_s=back,
-            demands=[
-                (within(watch.alarm(Flag.OLD_POSE), 0.3), "old pose flagged after 0.1 s"),
-                (only(others, Mode.FOLLOW), "nobody else even holds"),
+            demands=[(only(others, Mode.FOLLOW), "nobody else even holds")],
+            times=[
+                (watch.alarm(Flag.OLD_POSE), 0.3, "old pose flagged after 0.1 s"),
+                (back, REJOIN_S, "all back in 12 s"),
             ],
         )
 
@@ -118,7 +153,7 @@ def bad_weather(seconds: float) -> Fly:
             ages = bad.ages(references(flight.formation, flight.ids))
             modes = only(bad, Mode.FOLLOW)
             flight.lab.weather(Weather())
-            back = wait(flight, lambda: all_follow(flight), 2.0)
+            back = wait(flight, lambda: all_follow(flight))
             return judge(
                 f"lose 20 %, 50 +- 20 ms, duplicates, reordering, {seconds:.0f} s",
                 bad,

@@ -1,7 +1,13 @@
 """The table of plans."""
 
 from tests.chaos.kills import kill_bystander, kill_drones, kill_relay, kill_router, restart_drone
-from tests.chaos.links import bad_weather, lose_packets, partition, silence_vehicle
+from tests.chaos.links import (
+    bad_weather,
+    lose_packets,
+    partition,
+    rejoin_in_bad_weather,
+    silence_vehicle,
+)
 from tests.chaos.processes import fill_disk, freeze, step_clock, talk
 from tests.chaos.radio import simplex
 from tests.chaos.steps import Fly
@@ -18,10 +24,12 @@ PLANS: dict[str, Fly] = {
     "unheard": silence_vehicle,
     "simplex": simplex,
     "freeze": freeze,
-    "part": partition(8.0),
-    "part-long": partition(20.0),
+    "part": partition(8.0, "udp"),
+    "part-tcp": partition(8.0, "tcp"),
+    "part-long": partition(20.0, "udp"),
     "loss": lose_packets,
     "weather": bad_weather(60.0),
+    "rejoin": rejoin_in_bad_weather,
     "garbage": talk(200.0, "garbage"),
     "flood": talk(5000.0, "flood"),
     "clock": step_clock,

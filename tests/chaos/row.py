@@ -42,6 +42,7 @@ class Row:
         unused: Fraction of the samples of its inputs that a healthy drone never used.
         notes: Further measurements of this fault.
         failures: What was not as designed.
+        late: What was, but later than designed: a fault, or a machine that was busy with something else.
     """
 
     fault: str
@@ -54,6 +55,7 @@ class Row:
     unused: float
     notes: tuple[str, ...]
     failures: tuple[str, ...]
+    late: tuple[str, ...]
 
 
 def judge(
@@ -63,6 +65,7 @@ def judge(
     gone: str | None = None,
     recovered_s: float | None,
     demands: Iterable[tuple[bool, str]] = (),
+    times: Iterable[tuple[float | None, float, str]] = (),
     notes: Sequence[str] = (),
 ) -> Row:
     """Puts together what a watch has seen.
@@ -74,6 +77,7 @@ def judge(
         recovered_s: See `Row`.
         demands: What the design says of this fault: whether it held, and what was demanded. That it recovered,
             that bodies kept their distance and that nobody left the fence is demanded always.
+        times: What the design says of its times: how long it took, how long it may take, s, and what.
         notes: Further measurements.
     """
     referee = watch.referee()
@@ -97,6 +101,7 @@ def judge(
         unused=lost / max(total, 1),
         notes=tuple(notes),
         failures=tuple(text for held, text in (*always, *demands) if not held),
+        late=tuple(text for took, limit, text in times if took is None or took > limit),
     )
 
 
@@ -105,8 +110,8 @@ def write_csv(rows: Iterable[Row], path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow((*COLUMNS, "notes", "failures"))
-        writer.writerows((*_cells(row), "; ".join(row.notes), "; ".join(row.failures)) for row in rows)
+        writer.writerow((*COLUMNS, "notes", "failures", "late"))
+        writer.writerows((*_cells(row), *map("; ".join, (row.notes, row.failures, row.late))) for row in rows)
 
 
 def print_table(rows: Iterable[Row], console: Console) -> None:
@@ -119,6 +124,8 @@ def print_table(rows: Iterable[Row], console: Console) -> None:
     for row in rows:
         for failure in row.failures:
             console.print(f"{row.fault}: demanded: {failure}")
+        for late in row.late:
+            console.print(f"{row.fault}: late: {late}")
         for note in row.notes:
             console.print(f"{row.fault}: {note}")
 
@@ -133,7 +140,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         _number(row.min_distance_m, 3),
         str(row.fence_exits),
         f"{row.unused:.2%}",
-        "no" if row.failures else "yes",
+        "no" if row.failures else "late" if row.late else "yes",
     )
 
 

@@ -7,7 +7,7 @@ from shared.clock import NS_PER_S
 from shared.messages import Mode
 from tests.chaos.flight import ChaosFlight
 from tests.chaos.row import Row
-from tests.chaos.watch import Watch
+from tests.chaos.watch import ALARMS, Watch
 
 Fly = Callable[[Path], Row]
 """Flies one plan in a folder of its own."""
@@ -15,7 +15,9 @@ Fly = Callable[[Path], Row]
 CUE_S = 0.05
 """A token vanishes so soon, on one machine."""
 REJOIN_S = 12.0
-"""Everybody is back so soon, take-off included."""
+"""Everybody is back so soon, take-off included ..."""
+PATIENCE_S = 40.0
+"""... or, on a busy machine, so late."""
 SURVIVORS_ERROR = 0.10
 """The survivors stand so well where the repaired graph puts them."""
 
@@ -36,10 +38,15 @@ def all_follow(flight: ChaosFlight, reborn: Sequence[int] = ()) -> bool:
     return anew and flight.recorder.all_in(Mode.FOLLOW)
 
 
-def wait(flight: ChaosFlight, condition: Callable[[], bool], limit_s: float) -> float | None:
+def all_calm(flight: ChaosFlight) -> bool:
+    """Says whether everybody follows and nobody raises an alarm."""
+    return all_follow(flight) and not any(flight.recorder.latest(i).flags & ALARMS for i in flight.ids)
+
+
+def wait(flight: ChaosFlight, condition: Callable[[], bool]) -> float | None:
     """Waits until it holds; returns how long that took, s; None if it did not come."""
     try:
-        return flight.recorder.until(condition, limit_s)
+        return flight.recorder.until(condition, PATIENCE_S)
     except AssertionError:
         return None
 
@@ -53,11 +60,6 @@ def settle(watch: Watch, limit_s: float) -> float | None:
         off = watch.geometry_error(watch.drones) > SURVIVORS_ERROR
         shaped = None if off else (elapsed if shaped is None else shaped)
     return shaped
-
-
-def within(seconds: float | None, limit_s: float) -> bool:
-    """Says whether something happened soon enough."""
-    return seconds is not None and seconds <= limit_s
 
 
 def only(watch: Watch, *modes: Mode) -> bool:

@@ -3,28 +3,28 @@
 import subprocess
 import sys
 from collections.abc import Iterator
+from statistics import median
 
 import pytest
 
 from tests.chaos.lab import Lab, obstacle
 from tests.chaos.weather import Weather
 
-pytestmark = [pytest.mark.container, pytest.mark.timeout(60)]
+pytestmark = [pytest.mark.container, pytest.mark.timeout(120)]
 
 COUNT = 400
 HEAR = """
-import socket, time
+import select, socket, sys, time
 with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
     ear.bind(("", 9000))
     print("ready", flush=True)
-    ear.settimeout(0.7)
-    try:
-        while True:
-            datagram = ear.recv(100)
-            number, sent = map(int, datagram.split())
+    watched, patience = [ear, sys.stdin], None
+    while ready := select.select(watched, [], [], patience)[0]:
+        if ear in ready:
+            number, sent = map(int, ear.recv(100).split())
             print(number, time.monotonic_ns() - sent, flush=True)
-    except TimeoutError:
-        pass
+        else:  # the speaker has ended: only what is under way may still come
+            watched, patience = [ear], 0.7
 """
 SPEAK = """
 import socket, sys, time
@@ -46,7 +46,7 @@ def lab(request: pytest.FixtureRequest) -> Iterator[Lab]:
 def heard(lab: Lab, address: str) -> list[tuple[int, float]]:
     """Sends numbered datagrams from drone 1 to an address of drone 2; returns (number, delay in s)."""
     ear = (*lab.within("drone/2"), sys.executable, "-c", HEAR)
-    with subprocess.Popen(ear, stdout=subprocess.PIPE, text=True) as listening:
+    with subprocess.Popen(ear, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as listening:
         assert listening.stdout is not None
         assert listening.stdout.readline() == "ready\n"
         mouth = (*lab.within("drone/1"), sys.executable, "-c", SPEAK, address, str(COUNT))
@@ -78,14 +78,15 @@ def test_packets_are_lost_by_chance(lab: Lab) -> None:
 
 @pytest.mark.parametrize("lab", [True], indirect=True, ids=["emulator"])
 def test_the_emulator_makes_weather(lab: Lab) -> None:
+    fair = heard(lab, lab.mesh("drone/2"))
+    assert [number for number, _ in fair] == list(range(COUNT))
     lab.weather(Weather(delay=0.05, jitter=0.02, loss=0.2, duplicate=0.1))
     arrived = heard(lab, lab.mesh("drone/2"))
     numbers = [number for number, _ in arrived]
     assert 0.7 < len(set(numbers)) / COUNT < 0.9
     assert 1.03 < len(numbers) / len(set(numbers)) < 1.2
     assert numbers != sorted(numbers)
-    delays = sorted(delay for _, delay in arrived)
-    assert delays[0] >= 0.03
-    assert delays[len(delays) // 2] == pytest.approx(0.05, abs=0.01)
+    assert min(delay for _, delay in arrived) >= 0.03
+    assert median(delay for _, delay in arrived) >= median(delay for _, delay in fair) + 0.03
     lab.weather(Weather())
     assert [number for number, _ in heard(lab, lab.mesh("drone/2"))] == list(range(COUNT))

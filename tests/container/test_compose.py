@@ -19,8 +19,8 @@ from tests.integration.recorder import START_S, WORLD, Recorder
 pytestmark = [pytest.mark.container, pytest.mark.timeout(900)]
 
 SERVICES = ("world", "relay", *(f"drone-{i}" for i in (1, 2, 3, 4)), "bridge", "observer", "console")
-HEAL_S = 20.0
-HEALTHY_S = 60.0
+HEAL_S = 60.0
+HEALTHY_S = 120.0
 LARGEST_MB = 250.0
 """What our layers may add to the base image."""
 

@@ -19,7 +19,7 @@ UNITS = ROOT / "deploy/systemd"
 AGENT = "swarmtouch-agent@1"
 SERVICES = (AGENT, "swarmtouch-relay", "swarmtouch-glove", "swarmtouch-observer")
 MACHINE = "swarmtouch-test-machine"
-WAIT_S = 15.0
+WAIT_S = 60.0
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from deploy.status.listen import listen
 from shared.codec import encode
 from shared.config import load_scenario
 from shared.formation import build_formation
-from shared.messages import HandSample, Mode
+from shared.messages import Mode
 from shared.net.keyring import Keyring
 from shared.nodes import RELAY, all_nodes
 from shared.radio import Transmitter
@@ -118,11 +118,9 @@ def test_who_was_killed_comes_back_and_everybody_follows(swarm: Swarm, token: st
     killed_ns = swarm.kill(token)
     swarm.start(token)
 
-    def hands_since() -> list[HandSample]:
-        return [hand for (epoch, _), hand in swarm.recorder.hands.items() if epoch > killed_ns]
-
     def reborn() -> bool:
-        return bool(hands_since()) if token == RELAY_TOKEN else swarm.recorder.latest(1).epoch > killed_ns
+        newest = swarm.recorder.latest(1)
+        return (newest.heard[HAND.key()] if token == RELAY_TOKEN else newest).epoch > killed_ns
 
     swarm.recorder.until(lambda: reborn() and swarm.recorder.all_in(Mode.FOLLOW), START_S)
     assert swarm.recorder.latest(1).heard[HAND.key()].epoch == max(swarm.recorder.hands)[0]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.codec import MAX_PAYLOAD, decode, encode
+from shared.codec import MAX_PAYLOAD, decode, decode_strictly, decode_valid, encode
 from shared.config import load_scenario
 from shared.errors import DecodeError
 from shared.formation import build_formation
@@ -78,6 +78,17 @@ def test_every_message_survives_the_wire_exactly(data: st.DataObject, kind: type
     assert type(decoded) is kind
     assert encode(decoded) == payload
     assert msgpack.unpackb(payload)["v"] == SCHEMA_VERSION
+
+
+@given(data=st.data(), kind=KINDS)
+def test_both_decoders_agree_on_what_is_valid(data: st.DataObject, kind: type[Message]) -> None:
+    payload = encode(data.draw(MESSAGES[kind]))
+    assert decode_valid(payload, kind) == decode_strictly(payload, kind)
+    wrong = data.draw(mutations(kind))
+    taken = decode_valid(wrong, kind)
+    if taken is not None:
+        assert taken == decode_strictly(wrong, kind)
+        assert encode(taken) == encode(decode_strictly(wrong, kind))
 
 
 def test_words_and_flags_come_back_as_what_they_were() -> None:
