@@ -79,7 +79,7 @@ def test_whatever_comes_in_is_a_value_or_a_refusal(parser: Parser) -> None:
 
     anything = st.binary(max_size=300) | st.sampled_from(NASTY)
 
-    @settings(max_examples=600 if parser.is_wire else 300)
+    @settings(max_examples=500 if parser.is_wire else 200)
     @given(data=with_other_words(good) | with_other_bytes(good) | anything)
     def check(data: bytes) -> None:
         parser.accepts(data)
