@@ -7,7 +7,7 @@ from pathlib import Path
 
 from deploy.cli.arguments import add_flight_arguments, seconds
 
-DESCRIPTION = """Flies a scenario in one process on a virtual clock: real agents that exchange encoded bytes,
+DESCRIPTION = """Flies a scenario in one process on a virtual clock: real agents that exchange messages,
 tick by tick, with simulated bodies. The same inputs give the same bytes. It starts from a hover in the rest
 formation. --law central lets one computer compute all drones at once (vectorised: for large formations)."""
 EXAMPLE = """swarmtouch sim rhombus --seconds 20 --plot rhombus.png

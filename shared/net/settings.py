@@ -22,6 +22,9 @@ Settings = dict[str, Any]
 LEASE_MS = 1000
 KEEP_ALIVES = 10
 """How often per lease an idle link says so: with four, a datagram link that loses a fifth ends in minutes."""
+STATES_QUEUED = 16
+"""Samples that wait on a link while Zenoh's sending thread does not get the processor: a quarter of a second of
+them. With the default of two, a machine that is busy for three periods loses some, and `put` waits besides."""
 MAX_PUT_BYTES = 16_384
 """Zenoh drops larger ones uncounted; what is over the codec's 4 KiB but under this is counted as oversized."""
 MAX_MESSAGE_BYTES = 65_536
@@ -126,7 +129,13 @@ def _node(mode: str, listen: Sequence[str], connect: Sequence[str]) -> Settings:
         "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": {
             "unicast": {"open_timeout": OPEN_TIMEOUT_MS, "max_sessions": MAX_SESSIONS},
-            "link": {"tx": {"lease": LEASE_MS, "keep_alive": KEEP_ALIVES}},
+            "link": {
+                "tx": {
+                    "lease": LEASE_MS,
+                    "keep_alive": KEEP_ALIVES,
+                    "queue": {"size": {"real_time": STATES_QUEUED}},
+                }
+            },
             "shared_memory": {"enabled": False},
         },
     }

@@ -39,7 +39,6 @@ from shared.nodes import all_nodes, drone_node
 from shared.pointer_link import decode_pointed
 from shared.radio_link import decode_datagram, encode_head, radio_group
 from shared.ros_bag import read_bag_tracks
-from shared.scenario import Net
 from shared.senses import Senses
 from shared.signature import blank, sign_with, verify_with
 from shared.topics import HAND, TOPICS, rank, topic_of
@@ -150,13 +149,18 @@ def _scenario(path: Path) -> object:
 
 
 def _endpoint(data: bytes) -> object:
-    """An endpoint becomes Zenoh's configuration."""
+    """An endpoint becomes a part of Zenoh's configuration."""
     text = json.dumps(data.decode(errors="replace"))
-    scenario = load_scenario("rhombus", [f"net.endpoints.relay={text}"])
+    scenario = load_scenario("rhombus", [f"net.endpoints.relay={text}", f"net.endpoint={text}"])
     settings = node_settings(scenario, build_formation(scenario), drone_node(1))
     with suppress(zenoh.ZError):  # `shared.bus` makes a `DeviceError` of it
         zenoh.Config.from_json5(json.dumps(settings))
-    return scenario
+    return settings
+
+
+def _group(data: bytes) -> object:
+    text = json.dumps(data.decode(errors="replace"))
+    return radio_group(load_scenario("rhombus", [f"net.multicast={text}", f"net.interface={text}"]).net)
 
 
 def _radio(data: bytes) -> object:
@@ -208,11 +212,7 @@ PARSERS = (
         parse=lambda data: hear(PointerState(moved_ns=0), decode_pointed(data), 1),
         seeds=seeds.pointers,
     ),
-    _Wire(
-        name="radio",
-        parse=_radio,
-        seeds=lambda: [encode_head("s", HAND.key()) + hand for hand in seeds.hands()],
-    ),
+    _Wire(name="radio", parse=_radio, seeds=seeds.radio_datagrams),
     _Wire(name="page", parse=page.parse, seeds=seeds.page_messages),
     _Wire(name="key", parse=_key, seeds=lambda: [b"human/hand", b"drone/12/state", b"status/relay/0"]),
     _Wire(name="zenoh-log", parse=_zenoh_log, seeds=lambda: [seeds.ZENOH_LOG]),
@@ -232,12 +232,8 @@ PARSERS = (
         parse=lambda data: load_scenario(_argument(data)),
         seeds=lambda: [b"rhombus", b"line"],
     ),
-    Parser(name="endpoint", parse=_endpoint, seeds=lambda: [b"tcp/10.0.0.1:7447", b"udp/10.0.0.1:7#iface=lo"]),
-    Parser(
-        name="radio-group",
-        parse=lambda data: radio_group(Net(multicast=data.decode(errors="replace"))),
-        seeds=lambda: [b"224.0.0.225:7450", b"239.1.2.3:1"],
-    ),
+    Parser(name="endpoint", parse=_endpoint, seeds=lambda: [b"tcp/10.0.0.1:7447", b"quic/[::1]:7?mixed_rel=1"]),
+    Parser(name="radio-group", parse=_group, seeds=lambda: [b"224.0.0.225:7450"]),
     Parser(name="uri", parse=_uri, seeds=lambda: seeds.URIS[:1]),
     Parser(
         name="vehicle-uri",

@@ -4,6 +4,7 @@ Only bodies in the air count: a pair counts if at least one of the two is airbor
 counted once per episode.
 """
 
+import functools
 import math
 from typing import NamedTuple
 
@@ -138,8 +139,14 @@ def _pair_gaps(positions: Vec, airborne: Mask) -> Vec:
     """(N, N) distances of the pairs that count, infinite elsewhere; upper triangle."""
     offsets = positions[:, None] - positions[None]
     gaps: Vec = np.sqrt(np.einsum("ijk,ijk->ij", offsets, offsets))
-    gaps[np.tri(len(positions), dtype=bool) | ~(airborne[:, None] | airborne)] = np.inf
+    gaps[_counted_already(len(positions)) | ~(airborne[:, None] | airborne)] = np.inf
     return gaps
+
+
+@functools.cache
+def _counted_already(n: int) -> Mask:
+    """(N, N) lower triangle and diagonal: pairs that the upper one has."""
+    return np.tri(n, dtype=bool)
 
 
 def _column_gaps(positions: Vec, columns: Vec) -> Vec:
@@ -153,13 +160,16 @@ def _hand_gaps(positions: Vec, airborne: Mask, hand: Vec | None) -> Vec:
     """(N,) distances from the hand, infinite where they do not count."""
     if hand is None:
         return np.full(len(positions), np.inf)
-    return np.where(airborne, np.linalg.norm(positions - hand, axis=1), np.inf)
+    offsets = positions - hand
+    return np.where(airborne, np.sqrt(np.einsum("ij,ij->i", offsets, offsets)), np.inf)
 
 
 def _nearest(before: Closest, gaps: Vec, ids: tuple[int, ...], t: float) -> Closest:
-    where = np.unravel_index(np.argmin(gaps), gaps.shape)
-    distance = float(gaps[where])
-    return Closest(distance, tuple(ids[row] for row in where), t) if distance < before.distance else before
+    distance = float(gaps.min())
+    if distance < before.distance:
+        where = np.unravel_index(np.argmin(gaps), gaps.shape)
+        return Closest(distance, tuple(ids[row] for row in where), t)
+    return before
 
 
 def _begun(before: Mask, now: Mask) -> int:
