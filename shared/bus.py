@@ -142,9 +142,9 @@ class ZenohBus:
             declared.undeclare()
         self._declared.clear()
         self._session.close()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        watchdog.cancel()
         if self._radio:
             self._radio.close()
-        watchdog.cancel()
 
     def __enter__(self) -> Self:
         return self

@@ -1,23 +1,31 @@
 """`bench chain`: from the hand to the set-point of the last drone, against two floors in the same run.
 
-Three swarms of the same shape take turns, A B C A B C: real agents in a simulated flight, bare nodes over Zenoh
-with the same links, subscriptions and payload sizes, and bare nodes over UDP sockets. A latency runs from the
+Three swarms of the same shape take turns, A B C A B C: real agents in a simulated flight, bare nodes over
+Zenoh with the same links, subscriptions and payload sizes, and bare nodes over UDP sockets. With keys (profile
+`field`) the same agents without keys take turns with them; the floors never have any. A latency runs from the
 stamp of a hand sample to the stamp of the first set-point that contains it through every hop.
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from deploy.bench.figures import TEXT_COLUMNS, Spread, spread
 from deploy.bench.flight_ear import HopTimes
+from deploy.bench.profile import FIELD, in_profile, plain, signature_cost
 from deploy.bench.report import Json, Report, Sheet
 from deploy.bench.swarm import BenchError, Edit, fly, fly_bare_udp, fly_bare_zenoh
 from shared.config import load_scenario
 from shared.formation import build_formation
 
-NAMES = {"real": "agents", "zenoh": "bare nodes, Zenoh", "udp": "bare nodes, UDP sockets"}
+NAMES = {
+    "real": "agents",
+    "plain": "agents without keys",
+    "zenoh": "bare nodes, Zenoh",
+    "udp": "bare nodes, UDP sockets",
+}
 HOP_PARTS = ("transport", "wake", "step")
 
 
@@ -26,6 +34,7 @@ def measure(
     scenario: str = "rhombus",
     seconds: float,
     rounds: int,
+    profile: str | None = None,
     overrides: Sequence[str] = (),
     edit: Edit = lambda row: row,
     say: Callable[[str], None] = lambda _: None,
@@ -34,8 +43,9 @@ def measure(
 
     Args:
         scenario: Whose chain; the latency is that of its deepest drone.
-        seconds: How long each of the three is measured, all rounds together.
+        seconds: How long each swarm is measured, all rounds together.
         rounds: How often they take turns.
+        profile: `laptop` or `field` (with keys for this run only); None for the scenario's own.
         overrides: `key=value` items for the scenario.
         edit: Changes rows of the process table of the real swarm.
         say: Told what is going on.
@@ -44,35 +54,52 @@ def measure(
         ConfigError: The scenario is refused.
         BenchError: Somebody ended, or nothing came through.
     """
-    settings = load_scenario(scenario, overrides)
-    formation = build_formation(settings, scenario)
+    loaded = load_scenario(scenario, overrides)
+    formation = build_formation(loaded, scenario)
     last = formation.ids[formation.levels[-1][-1]]
-    taken: dict[str, list[list[float]]] = {name: [] for name in NAMES}
+    floor = plain(loaded)
     hops: dict[int, list[HopTimes]] = {drone: [] for drone in formation.ids}
     sizes: dict[int, int] = {}
-    for turn in range(rounds):
-        say(f"round {turn + 1} of {rounds}: agents")
-        flight, _ = fly(settings, formation, seconds / rounds, edit=edit)
-        taken["real"].append(flight.stats.latencies_ms[last])
-        for drone, times in flight.stats.hops.items():
-            hops[drone].append(times)
-        sizes = sizes or flight.payload_bytes()
-        for name, fly_bare in (("zenoh", fly_bare_zenoh), ("udp", fly_bare_udp)):
-            say(f"round {turn + 1} of {rounds}: {NAMES[name]}")
-            ear, _ = fly_bare(settings, formation, sizes, seconds / rounds)
-            taken[name].append(ear.latencies_ms[last])
-            if ear.payload_bytes != sizes:
-                raise BenchError(f"{NAMES[name]} sent {ear.payload_bytes} bytes instead of {sizes}")
+    with in_profile(loaded, formation, profile) as settings:
+        names = [name for name in NAMES if name != "plain" or settings.net.keys]
+        taken: dict[str, list[list[float]]] = {name: [] for name in names}
+        for turn in range(rounds):
+            say(f"round {turn + 1} of {rounds}: agents, {settings.net.profile}")
+            flight, _ = fly(settings, formation, seconds / rounds, edit=edit)
+            taken["real"].append(flight.stats.latencies_ms[last])
+            for drone, times in flight.stats.hops.items():
+                hops[drone].append(times)
+            sizes = sizes or flight.payload_bytes()
+            if settings.net.keys:
+                say(f"round {turn + 1} of {rounds}: {NAMES['plain']}")
+                flight, _ = fly(floor, formation, seconds / rounds, edit=edit)
+                taken["plain"].append(flight.stats.latencies_ms[last])
+            for name, fly_bare in (("zenoh", fly_bare_zenoh), ("udp", fly_bare_udp)):
+                say(f"round {turn + 1} of {rounds}: {NAMES[name]}")
+                ear, _ = fly_bare(floor, formation, sizes, seconds / rounds)
+                taken[name].append(ear.latencies_ms[last])
+                if ear.payload_bytes != sizes:
+                    raise BenchError(f"{NAMES[name]} sent {ear.payload_bytes} bytes instead of {sizes}")
+        cost = signature_cost(settings.net)
     for name, turns in taken.items():
         if not all(turns):
             raise BenchError(f"{NAMES[name]}: no hand sample came through to drone {last}; measure longer")
-    return _report(taken, _hop_medians(hops), sizes)
+    return _report(settings.net.profile, taken, _hop_medians(hops), sizes, cost)
 
 
-def _report(taken: dict[str, list[list[float]]], hops: dict[int, Json], sizes: dict[int, int]) -> Report:
+def _report(
+    profile: str,
+    taken: dict[str, list[list[float]]],
+    hops: dict[int, Json],
+    sizes: dict[int, int],
+    cost: Json,
+) -> Report:
     pooled = {name: [value for turn in turns for value in turn] for name, turns in taken.items()}
     of = {name: spread(values) for name, values in pooled.items()}
+    below = dict(pairwise(taken))
+    ratios = {name: _ratios(taken[name], taken[other]) for name, other in below.items()}
     record = {
+        "profile": profile,
         "p50_ms": of["real"].p50,
         "p99_ms": of["real"].p99,
         "floor_p50_ms": of["zenoh"].p50,
@@ -83,16 +110,20 @@ def _report(taken: dict[str, list[list[float]]], hops: dict[int, Json], sizes: d
         "udp_p99_ms": of["udp"].p99,
         "floor_ratio": of["zenoh"].p50 / of["udp"].p50,
         "ratio_by_round": _ratios(taken["real"], taken["zenoh"]),
-        "floor_ratio_by_round": _ratios(taken["zenoh"], taken["udp"]),
+        "floor_ratio_by_round": ratios["zenoh"],
         "floor_n": of["zenoh"].n,
         "udp_n": of["udp"].n,
         "payload_bytes": {str(node): size for node, size in sorted(sizes.items())},
         "hops": hops,
+        **cost,
     }
+    if "plain" in of:
+        record |= {"plain_p50_ms": of["plain"].p50, "plain_p99_ms": of["plain"].p99, "plain_n": of["plain"].n}
+        record |= {"profile_ratio_by_round": ratios["real"]}
     return Report(
-        name="chain",
+        name="chain-field" if profile == FIELD else "chain",
         records=(record,),
-        sheets=(_latency_sheet(of, record), _hop_sheet(hops)),
+        sheets=(_latency_sheet(of, ratios), _hop_sheet(hops)),
         draw=lambda figure: _draw(figure, pooled),
     )
 
@@ -110,19 +141,15 @@ def _hop_medians(hops: dict[int, list[HopTimes]]) -> dict[int, Json]:
     return {drone: {f"{part}_ms": median(drone, part) for part in HOP_PARTS} for drone in hops}
 
 
-def _latency_sheet(of: dict[str, Spread], record: Json) -> Sheet:
-    def row(name: str, ratios: Sequence[float]) -> tuple[str, ...]:
-        ratio = f"{min(ratios):.2f} to {max(ratios):.2f}" if ratios else ""
+def _latency_sheet(of: dict[str, Spread], ratios: dict[str, list[float]]) -> Sheet:
+    def row(name: str) -> tuple[str, ...]:
+        ratio = f"{min(ratios[name]):.2f} to {max(ratios[name]):.2f}" if name in ratios else ""
         return (NAMES[name], *of[name].text(), ratio)
 
     return Sheet(
         title="Hand to the last drone's set-point, ms",
         columns=("", *TEXT_COLUMNS, "times the row below, by round"),
-        rows=(
-            row("real", record["ratio_by_round"]),
-            row("zenoh", record["floor_ratio_by_round"]),
-            row("udp", ()),
-        ),
+        rows=tuple(map(row, of)),
     )
 
 

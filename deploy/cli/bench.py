@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.plot:
         check_plot(arguments.plot)
     if arguments.update:
-        split_at_block(arguments.what, arguments.update)
+        split_at_block(_block(arguments), arguments.update)
     measure = importlib.import_module(f"deploy.bench.{arguments.what}").measure
     outputs = ("command", "what", "json", "plot", "update")
     options = {name: value for name, value in vars(arguments).items() if name not in outputs}
@@ -64,6 +64,12 @@ def run(arguments: argparse.Namespace) -> int:
         for record in report.records:
             print(json.dumps(record | {"others_cores": conditions.others_cores()}), flush=True)
     return 0
+
+
+def _block(arguments: argparse.Namespace) -> str:
+    """Returns the name of the block in a document; a profile with keys has one of its own."""
+    secured = getattr(arguments, "profile", None) == "field"
+    return f"{arguments.what}-field" if secured else str(arguments.what)
 
 
 def _common(scenario: str) -> Declare:
@@ -97,6 +103,14 @@ def _numbers(text: str) -> tuple[int, ...]:
     return tuple(_positive(int)(part) for part in text.split(","))
 
 
+def _profile(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--profile",
+        choices=("laptop", "field"),
+        help="network profile of the agents; field has keys for this run only (default: the scenario's)",
+    )
+
+
 def _seconds(default: str) -> Declare:
     return _option("seconds", _positive(float), default, "time that counts, per swarm, s")
 
@@ -127,7 +141,7 @@ _KINDS = {
         "hand to the last drone's set-point, against bare Zenoh and raw UDP sockets",
         "--seconds 20",
         "rhombus",
-        (_seconds("20"), _rounds("4")),
+        (_seconds("20"), _rounds("4"), _profile),
     ),
     "step": Kind("one control step, decoding included", "--n 3000", "rhombus", (_number("3000"),)),
     "scale": Kind(

@@ -114,9 +114,8 @@ class ChaosFlight(Swarm):
         net = self.scenario.net
         endpoints = {node: self._endpoint(self.lab.air(node)) for node in net.endpoints}
         router = self._endpoint(self.lab.air(ROUTER)) if self._routed else None
-        # The hand's radio is in the mesh, where the recorder is not.
-        profile: Profile = "field" if self._profile == "radio" else self._profile
-        net = attrs.evolve(net, profile=profile, endpoints=endpoints, router=router)
+        # The hand's radio is in the mesh, where the recorder is not: it hears no hand.
+        net = attrs.evolve(net, interface="lo", endpoints=endpoints, router=router)
         return Witness(attrs.evolve(self.scenario, net=net))
 
     def command(self, row: ProcessRow) -> tuple[str, ...]:

@@ -37,6 +37,7 @@ from shared.net.keyring import Keyring
 from shared.net.settings import node_settings
 from shared.nodes import all_nodes, drone_node
 from shared.pointer_link import decode_pointed
+from shared.radio_link import decode_datagram, encode_head, radio_group
 from shared.ros_bag import read_bag_tracks
 from shared.senses import Senses
 from shared.signature import blank, sign_with, verify_with
@@ -148,14 +149,24 @@ def _scenario(path: Path) -> object:
 
 
 def _endpoint(data: bytes) -> object:
-    """An endpoint, the radio's group and its interface become Zenoh's configuration."""
+    """An endpoint becomes a part of Zenoh's configuration."""
     text = json.dumps(data.decode(errors="replace"))
-    keys = ("net.endpoints.relay", "net.multicast", "net.interface")
-    scenario = load_scenario("rhombus", [*(f"{key}={text}" for key in keys), "net.profile=radio"])
-    for settings in node_settings(scenario, build_formation(scenario), drone_node(1)):
-        with suppress(zenoh.ZError):  # `shared.bus` makes a `DeviceError` of it
-            zenoh.Config.from_json5(json.dumps(settings))
-    return scenario
+    scenario = load_scenario("rhombus", [f"net.endpoints.relay={text}", f"net.endpoint={text}"])
+    settings = node_settings(scenario, build_formation(scenario), drone_node(1))
+    with suppress(zenoh.ZError):  # `shared.bus` makes a `DeviceError` of it
+        zenoh.Config.from_json5(json.dumps(settings))
+    return settings
+
+
+def _group(data: bytes) -> object:
+    text = json.dumps(data.decode(errors="replace"))
+    return radio_group(load_scenario("rhombus", [f"net.multicast={text}", f"net.interface={text}"]).net)
+
+
+def _radio(data: bytes) -> object:
+    said = decode_datagram(data)
+    assert encode_head(said.swarm, said.key) + said.payload == data
+    return said
 
 
 def _uri(data: bytes) -> object:
@@ -201,6 +212,7 @@ PARSERS = (
         parse=lambda data: hear(PointerState(moved_ns=0), decode_pointed(data), 1),
         seeds=seeds.pointers,
     ),
+    _Wire(name="radio", parse=_radio, seeds=seeds.radio_datagrams),
     _Wire(name="page", parse=page.parse, seeds=seeds.page_messages),
     _Wire(name="key", parse=_key, seeds=lambda: [b"human/hand", b"drone/12/state", b"status/relay/0"]),
     _Wire(name="zenoh-log", parse=_zenoh_log, seeds=lambda: [seeds.ZENOH_LOG]),
@@ -220,7 +232,8 @@ PARSERS = (
         parse=lambda data: load_scenario(_argument(data)),
         seeds=lambda: [b"rhombus", b"line"],
     ),
-    Parser(name="endpoint", parse=_endpoint, seeds=lambda: [b"tcp/10.0.0.1:7447", b"udp/224.0.0.1:7#iface=lo"]),
+    Parser(name="endpoint", parse=_endpoint, seeds=lambda: [b"tcp/10.0.0.1:7447", b"quic/[::1]:7?mixed_rel=1"]),
+    Parser(name="radio-group", parse=_group, seeds=lambda: [b"224.0.0.225:7450"]),
     Parser(name="uri", parse=_uri, seeds=lambda: seeds.URIS[:1]),
     Parser(
         name="vehicle-uri",

@@ -20,8 +20,10 @@ from shared.codec import encode
 from shared.messages import FormationState, PatternEvent, ProcessStatus
 from shared.net.keyring import Keyring
 from shared.nodes import drone_node
+from shared.radio_link import encode_head
 from shared.ros_bag import TRANSFORM
 from shared.signature import blank, sign_with
+from shared.topics import HAND
 from tests.traces import flight, hand, state, write
 
 ZENOH_LOG = (
@@ -100,6 +102,11 @@ def pointers() -> list[bytes]:
     """Makes one datagram of every verb."""
     pointed = (pointer_link.Pointed(5, verb, (1.0, 0.0, 1.5), 0.1) for verb in pointer_link.Verb)
     return [pointer_link.encode_pointed(each) for each in pointed]
+
+
+def radio_datagrams() -> list[bytes]:
+    """Makes a signed hand sample on the air, and an empty payload."""
+    return [encode_head("rhombus", HAND.key()) + payload for payload in (hands()[1], b"")]
 
 
 def page_messages() -> list[bytes]:

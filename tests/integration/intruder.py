@@ -54,12 +54,12 @@ def session_of(settings: Settings) -> Iterator[Callable[[str, bytes], None]]:
         yield put
 
 
-def pour(put: Callable[[str, bytes], None], key: str, payload: bytes, *, rate_hz: float, seconds: float) -> int:
-    """Puts one payload again and again at a steady rate; returns how often."""
+def pour(put: Callable[[str, bytes], None], key: str, payload: bytes, *, count: int, rate_hz: float) -> None:
+    """Puts one payload again and again, at this rate unless the machine is too busy for it."""
     start, sent = time.monotonic(), 0
-    while (elapsed := time.monotonic() - start) < seconds:
-        while sent < elapsed * rate_hz:
+    while sent < count:
+        due = min(count, int((time.monotonic() - start) * rate_hz) + 1)
+        while sent < due:
             put(key, payload)
             sent += 1
         time.sleep(PACE_S)
-    return sent

@@ -17,6 +17,7 @@ from deploy.bench.swarm import BenchError, fly, fly_bare_udp, fly_bare_zenoh
 from deploy.launcher.process_table import ProcessRow
 from shared.config import load_scenario
 from shared.formation import build_formation
+from shared.signature import SIGNATURE_BYTES
 
 pytestmark = [
     pytest.mark.timeout(120),
@@ -82,6 +83,19 @@ def test_chain_keeps_its_contract() -> None:
     assert record["p50_ms"] <= record["p99_ms"]
     assert min(record["n"], record["floor_n"], record["udp_n"]) > 20
     assert set(record["hops"]) == {1, 2, 3, 4}
+
+
+def test_chain_with_keys_says_what_they_cost_and_keeps_none() -> None:
+    report = chain.measure(seconds=1.5, rounds=1, profile="field", overrides=[QUICK_TAKEOFF])
+    (record,) = report.records
+    assert report.name == "chain-field"
+    assert record["profile"] == "field"
+    assert all(math.isfinite(number) for number in numbers(record))
+    assert min(record["n"], record["plain_n"], record["floor_n"], record["udp_n"]) > 20
+    assert record["profile_ratio_by_round"] == [pytest.approx(record["p50_ms"] / record["plain_p50_ms"])]
+    assert record["payload_bytes"]["0"] > SIGNATURE_BYTES
+    assert record["sign_us"] > 0.0
+    assert record["verify_us"] > 0.0
 
 
 def test_scale_keeps_its_contract() -> None:

@@ -21,6 +21,7 @@ from deploy.bench.floor_rows import udp_rows, zenoh_rows
 from deploy.bench.hop import HAND_ID, Hop, Token, pack, unpack
 from deploy.bench.machine import Conditions
 from deploy.bench.plot import check_plot, save_plot
+from deploy.bench.profile import in_profile, plain, signature_cost
 from deploy.bench.report import Report, Sheet, markdown, print_report, write_block
 from deploy.bench.usage import read_usage
 from deploy.cli import main
@@ -30,6 +31,8 @@ from shared.config import load_scenario
 from shared.errors import ConfigError
 from shared.formation import build_formation
 from shared.messages import DroneState, HandSample, Heard, Mode, Wish
+from shared.net.keyring import Keyring
+from shared.net.settings import node_settings
 from shared.nodes import all_nodes, dials, drone_node, endpoint
 from shared.topics import DRONE_STATE, HAND
 
@@ -243,7 +246,7 @@ def test_a_file_without_the_block_is_refused(tmp_path: Path) -> None:
 
 def test_the_documentation_has_a_block_for_every_measurement() -> None:
     text = (Path(__file__).parents[2] / "docs" / "performance.md").read_text()
-    for name in ("chain", "step", "scale", "lockstep", "start"):
+    for name in ("chain", "chain-field", "step", "scale", "lockstep", "start"):
         assert f"<!-- bench {name} -->" in text
         assert f"<!-- end {name} -->" in text
 
@@ -291,6 +294,28 @@ def test_what_could_not_be_written_is_refused_before_anything_is_measured(
     output = capsys.readouterr()
     assert option[1] in output.err
     assert "round" not in output.err
+
+
+def test_keys_of_a_measurement_live_as_long_as_it_does() -> None:
+    with in_profile(RHOMBUS, FORMATION, "field") as flown:
+        folder = Path(flown.net.keys)
+        assert set(Keyring(folder).members()) == set(all_nodes(FORMATION))
+        assert node_settings(flown, FORMATION, drone_node(1))["access_control"]["enabled"]
+        cost = signature_cost(flown.net)
+    assert not folder.exists()
+    assert set(cost) == {"sign_us", "verify_us"}
+    assert min(cost.values()) > 0.0
+
+
+def test_a_scenario_keeps_its_own_keys_or_none() -> None:
+    own = load_scenario("rhombus", ["net.keys=somewhere"])
+    with in_profile(own, FORMATION, "field") as flown:
+        assert (flown.net.profile, flown.net.keys) == ("field", "somewhere")
+    for profile in ("laptop", None):
+        with in_profile(RHOMBUS, FORMATION, profile) as flown:
+            assert flown == RHOMBUS
+    assert plain(own) == RHOMBUS
+    assert signature_cost(RHOMBUS.net) == {}
 
 
 def test_a_wrong_scenario_is_refused_before_anything_is_measured(capsys: pytest.CaptureFixture[str]) -> None:

@@ -35,6 +35,11 @@ def test_a_hand_that_is_not_there_can_be_sent() -> None:
     assert decode(encode(sample), HandSample).position == NO_HAND
 
 
+def test_all_flags_but_one_are_flags() -> None:
+    assert ~Flag.FENCE & Flag.FENCE == Flag(0)
+    assert ~Flag.FENCE | Flag.FENCE == Flag(sum(Flag))
+
+
 def test_flags_are_distinct_bits_of_32() -> None:
     bits = [int(flag) for flag in Flag]
     assert all(bit.bit_count() == 1 for bit in bits)
