@@ -17,17 +17,19 @@ REPORT_NS = NS_PER_S
 """Refusals are logged at most this often."""
 MAX_NAMES = 16
 """Names are chosen by whoever knocks: more than this many are counted together."""
-MAX_NAME = 80
+MAX_NAME = 70
 """So is the key that they try: longer ones are cut, for a status has to stay small enough to be heard."""
 MAX_IDENTITIES = 256
 OTHERS = "others"
 LINKED, REFUSED = "linked ", "refused "
 """What the numbers begin with; the rest is the name."""
+TOO_LARGE = "too large"
 STRANGER = "a node without a certificate of ours"
 
 _DECISION = re.compile(
-    r"ThreadId\((\d+)\).* ([0-9a-f]{1,32}) (?:on \S+ )?is unauthorized to (Put|Delete) \(ingress\) on (\S+)"
+    r"ThreadId\((\d+)\).* ([0-9a-f]{1,32}) (?:on \S+ )?is (un)?authorized to (\w+) \((\w+)\) on (\S+)"
 )
+_COUNTED = (("Put", "ingress"), ("Delete", "ingress"))
 _DROPPED = re.compile(r"ThreadId\((\d+)\).* Msg intercepted")
 _REJECTED = re.compile(r"acceptor failed.*?(peer sent no certificates|invalid peer certificate: \w+)")
 
@@ -94,12 +96,15 @@ class Audit:
 
     def _read_line(self, line: str) -> None:
         # A decision may be made ahead of any message, and on each of several grounds: what is dropped counts,
-        # for the reason that the same thread told last.
+        # for the reason that the same thread told last. What the rules allow is dropped for its size alone.
         if decision := _DECISION.search(line):
-            thread, identity, verb, key = decision.groups()
-            self._decided[thread] = f"{self._names.get(identity, identity)} {verb.lower()} {key}"
-        elif (dropped := _DROPPED.search(line)) and (what := self._decided.pop(dropped[1], None)):
-            self._count(what)
+            thread, identity, refused, verb, flow, key = decision.groups()
+            self._decided.pop(thread, None)
+            if (verb, flow) in _COUNTED:
+                what = f"{self._names.get(identity, identity)} {verb.lower()} {key}"
+                self._decided[thread] = what if refused else f"{what[:MAX_NAME]}, {TOO_LARGE}"
+        elif (dropped := _DROPPED.search(line)) and (decided := self._decided.pop(dropped[1], None)):
+            self._count(decided)
         elif rejected := _REJECTED.search(line):
             self._count(f"{STRANGER} ({rejected[1]})")
 
@@ -111,5 +116,5 @@ class Audit:
             del self._names[next(iter(self._names))]
 
     def _count(self, who: str) -> None:
-        who = who[:MAX_NAME]
+        who = who[: MAX_NAME + len(f", {TOO_LARGE}")]
         self._refused[who if who in self._refused or len(self._refused) < MAX_NAMES else OTHERS] += 1

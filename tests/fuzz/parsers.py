@@ -2,6 +2,7 @@
 
 import gzip
 import json
+from binascii import crc_hqx
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
@@ -9,12 +10,14 @@ from pathlib import Path
 
 import zenoh
 from attrs import frozen
+from cobs import cobs
 
 from agents.vehicles import sim
 from agents.vehicles.link import decode_order, decode_pose, encode_order, encode_pose
 from deploy.net.authority import issued
 from glove_bridge.calibration_file import SHIPPED, load_calibration
 from glove_bridge.framing import StreamDecoder
+from glove_bridge.framing import decode as deframe
 from glove_bridge.framing import encode as frame
 from glove_bridge.gloves.serial import link_timing
 from glove_bridge.patterns import FOLDER, load_patterns
@@ -29,7 +32,7 @@ from observer.console.pattern_file import read_patterns as read_page_patterns
 from observer.trace.read import open_trace
 from shared.codec import decode, encode
 from shared.config import SCENARIOS, load_scenario
-from shared.errors import SwarmTouchError
+from shared.errors import DecodeError, SwarmTouchError
 from shared.flight_folder import read_meta, read_obstacles, read_patterns, read_track
 from shared.formation import build_formation
 from shared.net.audit import Audit
@@ -121,6 +124,9 @@ def _signed_hand(data: bytes) -> object:
 
 
 def _serial(data: bytes) -> object:
+    """Bytes on the line, and as a packet whose checksum is right."""
+    with suppress(DecodeError):
+        deframe(cobs.encode(data + crc_hqx(data, 0xFFFF).to_bytes(2, "big")))
     session = Session(USB, nonce=0)
     session.opened(0)
     for half in (data[: len(data) // 2], data[len(data) // 2 :]):

@@ -82,7 +82,6 @@ def test_no_secret_leaves_its_file(keys: Keyring, tmp_path: Path, monkeypatch: p
         flight.recorder.listen(FLOWN_S)
         shown = processes(flight)
         summary = flight.end()
-    assert summary["ok"], summary
     assert len(shown) >= 2 * 9
     places = [*haystacks(flight), *shown.items(), ("the summary", repr(summary).encode())]
     assert len(places) > 500

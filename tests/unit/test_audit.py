@@ -55,9 +55,18 @@ def test_a_decision_without_a_message_is_not_counted() -> None:
     assert watched.metrics() == {}
 
 
+def test_what_the_rules_allow_and_is_dropped_all_the_same_was_too_large() -> None:
+    watched = audit()
+    watched.linked(ZID, "drone/2", present=True)
+    allowed = FIRST.replace("unauthorized", "authorized")
+    watched.read(f"{FIRST}\n{allowed}\n{DROPPED}\n{allowed}\n{allowed}")
+    assert watched.metrics() == {"linked drone/2": 1.0, "refused drone/2 put s/human/hand, too large": 1.0}
+
+
 def test_what_is_authorized_or_leaves_is_not_counted() -> None:
     watched = audit()
-    watched.read(REFUSED.replace("unauthorized", "authorized"))
+    watched.read(FIRST.replace("unauthorized", "authorized"))
+    watched.read(f"{FIRST}\n{FIRST.replace('ingress', 'egress')}\n{DROPPED}")
     watched.read(REFUSED.replace("ingress", "egress"))
     watched.read(REFUSED.replace("Put", "Query"))
     assert watched.metrics() == {}
