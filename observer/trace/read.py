@@ -30,7 +30,7 @@ from shared.topics import DRONE_STATE, topic_of
 
 _LARGEST_RECORD = 1 << 28
 _LONGEST_COUNT = 20
-_DAMAGE = (MemoryError, McapError, ZstdError, struct.error, ValueError, RuntimeError)
+_DAMAGE = (MemoryError, OverflowError, McapError, ZstdError, struct.error, ValueError, RuntimeError)
 
 
 class Record(NamedTuple):

@@ -171,7 +171,6 @@ def test_the_relay_takes_nothing_from_anybody(unaffected: Swarm, keys: Keyring) 
     with session_of(client_of(door(unaffected, "relay"), keys, "drone/2")) as put:
         pour(put, key, state, count=20, rate_hz=50.0)
         wait_for(unaffected, lambda _: refused(unaffected, f"drone/2 put {key}", RELAY) >= 20, RELAY)
-    assert unaffected.recorder.statuses[RELAY].rejected == {}
 
 
 def test_status_tells_of_links_and_refusals_by_name(field: Swarm) -> None:
