@@ -1,6 +1,7 @@
 """`python -m observer`: records everything that a swarm says; commands nobody."""
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -14,12 +15,16 @@ from shared.nodes import OBSERVER
 from shared.process import add_process_arguments, explain, prepare_process
 from shared.transport import Inbox
 
+NICENESS = 5
+"""Who flies goes first. What is said meanwhile waits at the senders (`shared.net.settings.STATES_QUEUED`)."""
 _EXAMPLE = "example: python -m observer --scenario rhombus --run-dir runs/mine"
 
 
 def main() -> int:
     """Records until SIGTERM or SIGINT; returns the exit code."""
     arguments = _parse()
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
     stopping = prepare_process(OBSERVER, verbose=arguments.verbose)
     clock = system_clock()
     try:

@@ -59,7 +59,7 @@ class Mode(enum.StrEnum):
     STOP = "STOP"
 
 
-class Flag(enum.IntFlag):
+class Flag(enum.IntFlag, boundary=enum.CONFORM):
     """Conditions of a drone that the operator may have to feel."""
 
     EXTRAPOLATING = 1
@@ -79,10 +79,7 @@ class Flag(enum.IntFlag):
         """Keeps the flags that we know of a number of 32 bits: a newer publisher may set others."""
         if not (isinstance(value, int) and 0 <= value < 2**32):
             raise ValueError(f"flags {value!r}")
-        return super()._missing_(value & _KNOWN_FLAGS)
-
-
-_KNOWN_FLAGS = sum(flag.value for flag in Flag)
+        return super()._missing_(value)
 
 
 class Heard(NamedTuple):

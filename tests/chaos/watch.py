@@ -14,7 +14,7 @@ from shared.topics import HAND
 from tests.chaos.flight import ChaosFlight
 from tests.integration.recorder import WORLD
 
-ALARMS = ~(Flag.AVOIDING | Flag.FENCE | Flag.EXTRAPOLATING)
+ALARMS = Flag(sum(Flag)) ^ (Flag.AVOIDING | Flag.FENCE | Flag.EXTRAPOLATING)
 """Flags that say that something is wrong, and not just late."""
 
 
@@ -135,7 +135,9 @@ class Watch:
     def _alarm_of(self, drone: int, flags: Flag) -> float | None:
         states = self.states(drone)
         raised = states[0].flags if states else Flag(0)
-        return next(((s.step_ns - self.start_ns) / NS_PER_S for s in states if s.flags & flags & ~raised), None)
+        return next(
+            ((s.step_ns - self.start_ns) / NS_PER_S for s in states if s.flags & flags & ~raised.value), None
+        )
 
     def _stamps(self) -> dict[tuple[str, int, int], int]:
         recorder = self.flight.recorder

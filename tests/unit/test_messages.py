@@ -8,7 +8,8 @@ from shared.errors import DecodeError, SwarmTouchError
 from shared.messages import NO_HAND, ORIGIN, Flag, HandSample, Message, Mode, Wish
 from shared.topics import TOPICS
 
-KINDS = Message.__subclasses__()
+# By name: attrs makes a second class for the slots, and the first lives on until it is collected.
+KINDS = list({kind.__name__: kind for kind in Message.__subclasses__()}.values())
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -33,6 +34,12 @@ def test_a_sample_cannot_be_changed() -> None:
 def test_a_hand_that_is_not_there_can_be_sent() -> None:
     sample = HandSample(epoch=1, seq=0, stamp_ns=1, position=NO_HAND, velocity=ORIGIN, yaw=0.0, mode=Wish.HOLD)
     assert decode(encode(sample), HandSample).position == NO_HAND
+
+
+def test_all_flags_but_one_are_flags() -> None:
+    others = ~Flag.FENCE
+    assert Flag.FENCE not in others
+    assert list(others | Flag.FENCE) == list(Flag)
 
 
 def test_flags_are_distinct_bits_of_32() -> None:
