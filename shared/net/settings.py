@@ -86,6 +86,9 @@ def peer_settings(
     if any(link.startswith("udp/") for link in (*heard, *dialled)):
         # Only here: the key pair by which links prove that they belong together takes 20 ms to make.
         settings["transport"]["unicast"]["max_links"] = 2
+        # What TCP repeats in bad weather may take longer than the usual lease, and a link that comes back to a
+        # transport which only one side has given up leaves both deaf.
+        settings["transport"]["link"]["tx"] = {"lease": 4 * LEASE_MS, "keep_alive": 4 * KEEP_ALIVES}
     return settings
 
 

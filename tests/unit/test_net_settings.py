@@ -86,10 +86,13 @@ def test_the_field_has_certificates_rules_and_guards(field: Scenario) -> None:
 def test_beside_an_endpoint_of_datagrams_stands_one_of_tcp() -> None:
     scenario = load_scenario("rhombus", ["net.endpoint=udp/{node}.local:7447"])
     settings = node_settings(scenario, RHOMBUS, "drone/1")
+    plain = node_settings(load_scenario("rhombus"), RHOMBUS, "drone/1")
     assert settings["listen"]["endpoints"] == ["tcp/drone-1.local:7447?rel=1", "udp/drone-1.local:7447?rel=0"]
     assert settings["connect"]["endpoints"] == ["tcp/relay.local:7447?rel=1", "udp/relay.local:7447?rel=0"]
     assert settings["transport"]["unicast"]["max_links"] == 2
-    plain = node_settings(load_scenario("rhombus"), RHOMBUS, "drone/1")
+    slow, usual = (each["transport"]["link"]["tx"] for each in (settings, plain))
+    assert slow["lease"] > usual["lease"]
+    assert slow["lease"] / slow["keep_alive"] == usual["lease"] / usual["keep_alive"]
     assert "max_links" not in plain["transport"]["unicast"]
 
 
