@@ -30,8 +30,9 @@ MAX_PUT_BYTES = 16_384
 MAX_MESSAGE_BYTES = 65_536
 MAX_SESSIONS = 64
 ROUTER_TIMEOUT_MS = 3000
-OPEN_TIMEOUT_MS = 1500
-"""Closing waits for every attempt to dial somebody who is not there: less than `bus.CLOSE_TIMEOUT_S`."""
+OPEN_TIMEOUT_MS = 4000
+"""How long one attempt to dial somebody may take: time for two repetitions of what was lost. A QUIC listener
+whose handshake the other side gives up half way waits for it, and lets nobody else in, for a minute or two."""
 
 
 def node_settings(scenario: Scenario, formation: Formation, node: str, *, listening: bool = True) -> Settings:
@@ -88,7 +89,7 @@ def peer_settings(
         settings["transport"]["unicast"]["max_links"] = 2
         # What TCP repeats in bad weather may take longer than the usual lease, and a link that comes back to a
         # transport which only one side has given up leaves both deaf.
-        settings["transport"]["link"]["tx"] = {"lease": 4 * LEASE_MS, "keep_alive": 4 * KEEP_ALIVES}
+        settings["transport"]["link"]["tx"] |= {"lease": 4 * LEASE_MS, "keep_alive": 4 * KEEP_ALIVES}
     return settings
 
 

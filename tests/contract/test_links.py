@@ -12,7 +12,7 @@ import zenoh
 
 from deploy.launcher.ports import free_ports
 from shared.bus import ZenohBus
-from shared.net.settings import peer_settings
+from shared.net.settings import OPEN_TIMEOUT_MS, peer_settings
 from shared.topics import HAND
 from tests.contract.test_bus_contract import DEADLINE_S, collect, inbox_of, link
 
@@ -57,6 +57,17 @@ def test_no_tcp_link_is_closed_with_a_wait() -> None:
     where = f"tcp/127.0.0.1:{port}"
     with ZenohBus(peer_settings("swarm", where)), ZenohBus(peer_settings("swarm", "", [where])):
         wait_for(lambda: lingers(port) == [0, 0])
+
+
+def test_closing_does_not_wait_for_somebody_who_does_not_answer() -> None:
+    (port,) = free_ports(tcp=1, udp=0)[0]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", port))
+        bus = ZenohBus(peer_settings("swarm", "", [f"udp/127.0.0.1:{port}"]))
+        assert silent.recv(65_536), "it is being dialled"
+        start = time.monotonic()
+        bus.close()
+        assert time.monotonic() - start < OPEN_TIMEOUT_MS / 1000
 
 
 def lingers(port: int) -> list[int]:
