@@ -139,7 +139,7 @@ class ZenohBus:
         leaving.start()
         leaving.join(CLOSE_TIMEOUT_S)
         if leaving.is_alive():
-            _log.warning("the bus is still closing after %.1f s; going on without it", CLOSE_TIMEOUT_S)
+            _log.info("the bus is still closing after %.1f s; going on without it", CLOSE_TIMEOUT_S)
         if self._radio:
             self._radio.close()
 

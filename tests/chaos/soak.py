@@ -27,6 +27,8 @@ WARM_UP_S = 60.0
 CALM_S = 6.0
 FAULT_S = 3.0
 RECOVERY_S = 60.0
+SETTLE_S = 15.0
+"""Zenoh keeps a thread that has looked up an address for ten seconds."""
 READINGS = 5
 LARGEST_GROWTH = 0.02
 SPARED = 2
@@ -166,6 +168,7 @@ def recovery(flight: ChaosFlight) -> float:
 def grown(flight: ChaosFlight, before: dict[str, Holdings], pids: dict[str, int]) -> bool:
     """Compares what the processes that were never killed hold with what they held; returns whether one grew."""
     wrong = False
+    flight.recorder.listen(SETTLE_S)
     after = holdings(flight)
     for token in sorted(before):
         if flight.processes[token].pid != pids[token]:
