@@ -16,17 +16,18 @@ LONGEST_S = 4.0
 _PERIOD_S = 0.05
 
 
-def listen(scenario: Scenario, only: tuple[str, ...] = ()) -> list[Row]:
-    """Listens until everybody has been heard to be well, at most for `LONGEST_S`.
+def listen(scenario: Scenario, only: tuple[str, ...] = (), longest_s: float | None = None) -> list[Row]:
+    """Listens until everybody has been heard to be well, at most for a while.
 
     Args:
         scenario: The resolved scenario of the swarm.
         only: Tokens of the processes that count; empty for all.
+        longest_s: How long at most, s; None for `LONGEST_S`.
     """
     formation = build_formation(scenario)
     simulated = any((vehicle_settings(scenario, i).uri or "").startswith("sim:") for i in formation.ids)
     expected = expected_processes(formation.ids, simulated=simulated)
-    deadline = time.monotonic() + LONGEST_S
+    deadline = time.monotonic() + (LONGEST_S if longest_s is None else longest_s)
     with open_observer(scenario) as bus:
         monitor = Monitor(bus, formation, system_clock())
         while True:
