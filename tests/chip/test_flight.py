@@ -29,8 +29,8 @@ def fly(process: Launcher) -> dict[str, Any]:
     assert summary["ok"]
     assert (summary["restarts"], summary["collisions"], summary["fence_exits"]) == (0, 0, 0)
     for agent in summary["agents"]:
-        assert agent["hand_used"] > 0.9
-        assert agent["rate_hz"] > 50.0
+        assert agent["hand_used"] > 0.7
+        assert agent["rate_hz"] > 40.0
     return summary
 
 
