@@ -1,4 +1,4 @@
-"""Soak: `python -m tests.chaos.soak [--minutes 30] [--drones 8]`, as root: fault after fault on one flight.
+"""Soak: `python -m tests.chaos.soak [--minutes 30] [--drones 8] [--links udp]`, as root: fault after fault on one flight.
 
 What lives through all of them must not grow: memory, threads and open files of every process that was never
 killed, after a minute of flight and at the end, both times with everybody in formation. Exit code 0: it did
@@ -112,6 +112,9 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--drones", type=int, default=8)
     parser.add_argument("--hz", type=float, default=60.0, help="rate of hand and control, for a slow machine")
+    parser.add_argument(
+        "--links", choices=("tcp", "udp"), default="tcp", help="docs/chaos.md has their weather"
+    )
     arguments = parser.parse_args()
     if reason := obstacle():
         print(f"soak: {reason}", file=sys.stderr)
@@ -121,7 +124,7 @@ def main() -> int:
         Path(tempfile.mkdtemp(prefix="soak-")),
         "scripted:tour?peak=0.3",
         "grid",
-        protocol="udp",
+        protocol=arguments.links,
         overrides=[f"formation.n={arguments.drones}", *rates],
     ) as flight:
         faulty = soak(flight, 60.0 * arguments.minutes)
