@@ -1,4 +1,4 @@
-"""Soak: `python -m tests.chaos.soak [--minutes 30] [--drones 8] [--links udp]`, as root: fault after fault on one flight.
+"""Soak: `python -m tests.chaos.soak [--minutes 30] [--drones 8]`, as root: fault after fault on one flight.
 
 What lives through all of them must not grow: memory, threads and open files of every process that was never
 killed, after a minute of flight and at the end, both times with everybody in formation. Exit code 0: it did
