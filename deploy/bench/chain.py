@@ -8,11 +8,10 @@ stamp of a hand sample to the stamp of the first set-point that contains it thro
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from deploy.bench.figures import TEXT_COLUMNS, Spread, spread
+from deploy.bench.figures import TEXT_COLUMNS, Spread, draw_shares, ratio_by_round, spread
 from deploy.bench.flight_ear import HopTimes
 from deploy.bench.profile import FIELD, in_profile, plain, signature_cost
 from deploy.bench.report import Json, Report, Sheet
@@ -97,7 +96,7 @@ def _report(
     pooled = {name: [value for turn in turns for value in turn] for name, turns in taken.items()}
     of = {name: spread(values) for name, values in pooled.items()}
     below = dict(pairwise(taken))
-    ratios = {name: _ratios(taken[name], taken[other]) for name, other in below.items()}
+    ratios = {name: ratio_by_round(taken[name], taken[other]) for name, other in below.items()}
     record = {
         "profile": profile,
         "p50_ms": of["real"].p50,
@@ -109,7 +108,7 @@ def _report(
         "floor_p99_ms": of["zenoh"].p99,
         "udp_p99_ms": of["udp"].p99,
         "floor_ratio": of["zenoh"].p50 / of["udp"].p50,
-        "ratio_by_round": _ratios(taken["real"], taken["zenoh"]),
+        "ratio_by_round": ratio_by_round(taken["real"], taken["zenoh"]),
         "floor_ratio_by_round": ratios["zenoh"],
         "floor_n": of["zenoh"].n,
         "udp_n": of["udp"].n,
@@ -124,13 +123,12 @@ def _report(
         name="chain-field" if profile == FIELD else "chain",
         records=(record,),
         sheets=(_latency_sheet(of, ratios), _hop_sheet(hops)),
-        draw=lambda figure: _draw(figure, pooled),
+        draw=lambda figure: draw_shares(
+            figure,
+            {NAMES[name]: values for name, values in pooled.items()},
+            "latency from the hand to the last drone's set-point, ms",
+        ),
     )
-
-
-def _ratios(above: Sequence[Sequence[float]], below: Sequence[Sequence[float]]) -> list[float]:
-    """Returns the ratio of the medians, round by round: its spread says how far the ratio can be trusted."""
-    return [float(np.median(a) / np.median(b)) for a, b in zip(above, below, strict=True)]
 
 
 def _hop_medians(hops: dict[int, list[HopTimes]]) -> dict[int, Json]:
@@ -163,13 +161,3 @@ def _hop_sheet(hops: dict[int, Json]) -> Sheet:
         columns=("", "encoding and transport", "wake-up and decoding", "step and command"),
         rows=tuple(rows),
     )
-
-
-def _draw(figure: Any, pooled: dict[str, list[float]]) -> None:
-    axes = figure.subplots()
-    for name, values in pooled.items():
-        axes.plot(np.sort(values), np.arange(1, len(values) + 1) / len(values), label=NAMES[name])
-    axes.set(
-        xscale="log", xlabel="latency from the hand to the last drone's set-point, ms", ylabel="share below"
-    )
-    axes.legend()

@@ -1,6 +1,7 @@
 """Numbers that can be trusted: how many, the median, and how far they spread."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from attrs import frozen
@@ -44,3 +45,17 @@ def spread(values: Sequence[float]) -> Spread:
         raise ValueError("nothing was measured")
     p10, p50, p90, p99 = np.percentile(values, (10, 50, 90, 99)).tolist()
     return Spread(n=len(values), p10=p10, p50=p50, p90=p90, p99=p99)
+
+
+def ratio_by_round(above: Sequence[Sequence[float]], below: Sequence[Sequence[float]]) -> list[float]:
+    """Returns the ratio of the medians, round by round: its spread says how far the ratio can be trusted."""
+    return [float(np.median(a) / np.median(b)) for a, b in zip(above, below, strict=True)]
+
+
+def draw_shares(figure: Any, values: Mapping[str, Sequence[float]], xlabel: str) -> None:
+    """Draws the share of values below each value, one line per name, into a `matplotlib` figure."""
+    axes = figure.subplots()
+    for name, each in values.items():
+        axes.plot(np.sort(each), np.arange(1, len(each) + 1) / len(each), label=name)
+    axes.set(xscale="log", xlabel=xlabel, ylabel="share below")
+    axes.legend()

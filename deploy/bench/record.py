@@ -7,13 +7,12 @@ message that is new in a step to the start of that step.
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from attrs import frozen
 
 from deploy.bench.comb import comb
-from deploy.bench.figures import TEXT_COLUMNS, spread
+from deploy.bench.figures import TEXT_COLUMNS, Spread, draw_shares, ratio_by_round, spread
 from deploy.bench.flight_ear import FlightEar
 from deploy.bench.report import Json, Report, Sheet
 from deploy.bench.swarm import Phase, fly
@@ -85,12 +84,17 @@ def measure(
         for recorded, name in NAMES.items():
             say(f"round {turn + 1} of {rounds}: {name}")
             turns[recorded].append(_take_turn(settings, formation, seconds / rounds, recorded=recorded))
-    record = _record(agents, turns)
+    by_round = {recorded: [turn.lateness_ms() for turn in of] for recorded, of in turns.items()}
+    late = {recorded: [value for values in of for value in values] for recorded, of in by_round.items()}
+    of = {recorded: spread(values) for recorded, values in late.items()}
+    record = _record(agents, turns, of, ratio_by_round(by_round[True], by_round[False]))
     return Report(
         name="record",
         records=(record,),
-        sheets=(_lateness_sheet(turns, record), _trace_sheet(record)),
-        draw=lambda figure: _draw(figure, turns),
+        sheets=(_lateness_sheet(of, record), _trace_sheet(record)),
+        draw=lambda figure: draw_shares(
+            figure, {NAMES[on]: values for on, values in late.items()}, "lateness of a step, ms"
+        ),
     )
 
 
@@ -109,10 +113,8 @@ def _read(folder: Path) -> Taken:
     return Taken(messages=number, missing=missing, dropped=trace.dropped)
 
 
-def _record(agents: int, turns: dict[bool, list[Turn]]) -> Json:
-    late = {recorded: [turn.lateness_ms() for turn in of] for recorded, of in turns.items()}
-    pooled = {recorded: [value for values in of for value in values] for recorded, of in late.items()}
-    off, on = spread(pooled[False]), spread(pooled[True])
+def _record(agents: int, turns: dict[bool, list[Turn]], of: dict[bool, Spread], ratios: list[float]) -> Json:
+    off, on = of[False], of[True]
     traces = [turn.trace for turn in turns[True] if turn.trace]
     recorder = [turn.phase.usage[f"{OBSERVER}/0"].cpu_s / turn.phase.seconds for turn in turns[True]]
     return {
@@ -125,9 +127,7 @@ def _record(agents: int, turns: dict[bool, list[Turn]]) -> Json:
         "unrecorded_p99_ms": off.p99,
         "ratio": on.p50 / off.p50,
         "ratio_p99": on.p99 / off.p99,
-        "ratio_by_round": [
-            float(np.median(b) / np.median(a)) for a, b in zip(late[False], late[True], strict=True)
-        ],
+        "ratio_by_round": ratios,
         "n": on.n,
         "rate_hz": _rate_hz(turns[True]),
         "unrecorded_rate_hz": _rate_hz(turns[False]),
@@ -144,11 +144,10 @@ def _rate_hz(turns: Sequence[Turn]) -> float:
     return float(np.mean([agent.rate_hz for turn in turns for agent in turn.ear.stats.agents()]))
 
 
-def _lateness_sheet(turns: dict[bool, list[Turn]], record: Json) -> Sheet:
+def _lateness_sheet(of: dict[bool, Spread], record: Json) -> Sheet:
     rate = {False: record["unrecorded_rate_hz"], True: record["rate_hz"]}
     ratios = {False: "", True: " ".join(f"{ratio:.2f}" for ratio in record["ratio_by_round"])}
-    late = {on: [value for turn in of for value in turn.lateness_ms()] for on, of in turns.items()}
-    rows = tuple((name, *spread(late[on]).text(3), f"{rate[on]:.1f}", ratios[on]) for on, name in NAMES.items())
+    rows = tuple((name, *of[on].text(3), f"{rate[on]:.1f}", ratios[on]) for on, name in NAMES.items())
     title = f"Lateness of a step of {record['agents']} agents, ms"
     return Sheet(title=title, columns=("", *TEXT_COLUMNS, "steps/s", "times the row above"), rows=rows)
 
@@ -164,12 +163,3 @@ def _trace_sheet(record: Json) -> Sheet:
     )
     columns = ("core", "messages", "links", "missing", "missing, worst link", "dropped by it")
     return Sheet(title="The recorder", columns=("", *columns), rows=((f"{record['seconds']:.0f} s", *row),))
-
-
-def _draw(figure: Any, turns: dict[bool, list[Turn]]) -> None:
-    axes = figure.subplots()
-    for on, name in NAMES.items():
-        values = np.sort([late for turn in turns[on] for late in turn.lateness_ms()])
-        axes.plot(values, np.arange(1, len(values) + 1) / len(values), label=name)
-    axes.set(xscale="log", xlabel="lateness of a step, ms", ylabel="share below")
-    axes.legend()

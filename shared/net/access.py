@@ -8,12 +8,12 @@ subscription is let through if its whole key expression lies within an allowed o
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from shared.nodes import BRIDGE, OBSERVER, RELAY, WORLD
+from shared.nodes import BRIDGE, CONSOLE, OBSERVER, RELAY, WORLD
 from shared.topics import ALIVE, DRONE_STATE, FORMATION_STATE, HAND, PATTERN, STATUS, TOPICS
 
 Rules = dict[str, Any]
 
-OBSERVING_ROLES = (OBSERVER, "console")
+OBSERVING_ROLES = (OBSERVER, CONSOLE)
 HEARING = ("declare_subscriber", "liveliness_query", "declare_liveliness_subscriber")
 """Messages by which a node says what it wants to hear; nothing in flight depends on their content."""
 
