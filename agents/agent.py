@@ -8,7 +8,7 @@ from agents.control.single.avoidance import Encounter
 from agents.control.single.repair import REFERENCE_LOST, Reference
 from agents.control.single.steering import Bystander
 from agents.control.step import Inputs, Settings, State, start, step
-from agents.stepping import due_ns, step_rule
+from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
 from shared.formation import Formation
@@ -58,18 +58,14 @@ class Agent:
         self._used: dict[str, Heard] = {}
         self._last_step_ns = 0
 
-    @property
-    def triggers(self) -> frozenset[str]:
-        """Returns the keys that a step may wait for; whom it only avoids never triggers one."""
-        return frozenset([HAND_KEY, *self._references.values()])
-
     def receive(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Takes in what the bus delivered."""
         self.senses.take(arrivals)
 
-    def due_ns(self, now_ns: int) -> int:
+    def due(self, now_ns: int) -> Due:
         """Returns when the next step is due, given what has been heard so far."""
-        return due_ns(self._rule, self._last_step_ns, inputs_complete=self._inputs_complete(now_ns))
+        awaited = self._awaited(now_ns)
+        return Due(due_ns(self._rule, self._last_step_ns, inputs_complete=not awaited), awaited)
 
     def step(self, now_ns: int, pose: Pose, pose_age: float) -> DroneState:
         """Computes one step.
@@ -113,23 +109,26 @@ class Agent:
         self.steps += 1
         return state
 
-    def _inputs_complete(self, now_ns: int) -> bool:
-        """Says whether the hand and every reference that is alive are newer than at the last step.
+    def _awaited(self, now_ns: int) -> list[str]:
+        """Returns the inputs that are alive but not newer than at the last step; none: a step may be made.
 
-        References that have caught up with the hand of the last step do not wait for the next hand: a step
-        that was too early for them would otherwise leave every later one a whole period behind.
+        Whom it only avoids is never waited for. The hand is, but last: everybody hears it at once, and a drone
+        has nothing to do before its references have stepped. References that have caught up with the hand of
+        the last step do not wait for the next hand: a step that was too early for them would otherwise leave
+        every later one a whole period behind.
         """
         live = [
             (key, sensed)
             for other, key in self._references.items()
             if (sensed := self.senses.drones.get(other)) and sensed.age(now_ns) <= REFERENCE_LOST
         ]
-        fresh = [self._is_fresh(key, sensed) for key, sensed in live]
+        if old := [key for key, sensed in live if not self._is_fresh(key, sensed)]:
+            return old
         hand = self.senses.hand
-        if hand is not None and hand.age(now_ns) <= HAND_STALE:
-            caught_up = bool(live) and all(_has_used(sensed.message, hand.message) for _, sensed in live)
-            fresh.append(caught_up or self._is_fresh(HAND_KEY, hand))
-        return bool(fresh) and all(fresh)
+        if hand is None or hand.age(now_ns) > HAND_STALE:
+            return [] if live else [HAND_KEY]
+        caught_up = bool(live) and all(_has_used(sensed.message, hand.message) for _, sensed in live)
+        return [] if caught_up or self._is_fresh(HAND_KEY, hand) else [HAND_KEY]
 
     def _is_fresh(self, key: str, sensed: Sensed[HandSample] | Sensed[DroneState]) -> bool:
         used = self._used.get(key)

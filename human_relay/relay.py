@@ -7,7 +7,6 @@ source's, the operator's and the relay's own, with STOP > LAND > HOLD > whatever
 import math
 from typing import NamedTuple
 
-
 from human_relay.sources.base import HandPose
 from human_relay.velocity import VelocityState, step
 from shared.clock import NS_PER_S
