@@ -27,20 +27,20 @@ class Turns:
         self._failure: Exception | None = None
 
     def take(self) -> None:
-        """Makes a turn on the main thread.
+        """Makes a turn on the main thread, after one that another thread is making: both hang if that hangs.
 
         Raises:
             Exception: What ended this turn, or an earlier one on another thread.
         """
         self._due_earlier.clear()
-        self._make()
+        self._make(patiently=True)
         if self._failure is not None:
             raise self._failure
 
     def take_aside(self) -> None:
         """Makes a turn on any other thread; the main thread is told what goes wrong."""
         try:
-            self._make()
+            self._make(patiently=False)
         except Exception as error:  # noqa: BLE001  nobody else would see it: it is raised in `take`
             self._failure = error
             self._due_earlier.set()
@@ -54,10 +54,10 @@ class Turns:
         """Waits for a turn that is being made; there is none after it."""
         self._taken.acquire()
 
-    def _make(self) -> None:
+    def _make(self, *, patiently: bool) -> None:
         self._wanted = True
         # Looked at again after the release: somebody may have found the turn taken, and gone.
-        while self._wanted and self._taken.acquire(blocking=False):
+        while self._wanted and self._taken.acquire(blocking=patiently):
             try:
                 self._wanted = False
                 before, self._due_ns = self._due_ns, self._turn()

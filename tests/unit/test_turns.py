@@ -118,6 +118,29 @@ def test_a_rest_ends_when_a_turn_aside_finds_the_next_one_due_earlier() -> None:
     assert rested.wait(DEADLINE_S)
 
 
+def test_the_main_thread_waits_for_a_turn_aside_so_that_its_watchdog_sees_it_hang() -> None:
+    begun, finish, passed = threading.Event(), threading.Event(), threading.Event()
+
+    def hold() -> None:
+        begun.set()
+        assert finish.wait(DEADLINE_S)
+
+    loop = Loop(hold)
+    turns = Turns(loop.turn, time.monotonic_ns)
+    aside(turns)
+    assert begun.wait(DEADLINE_S)
+
+    def take() -> None:
+        turns.take()
+        passed.set()
+
+    threading.Thread(target=take, daemon=True).start()
+    assert not passed.wait(0.05)
+    finish.set()
+    assert passed.wait(DEADLINE_S)
+    assert not loop.overlapped
+
+
 def test_there_is_no_turn_after_the_end() -> None:
     loop = Loop()
     turns = Turns(loop.turn, time.monotonic_ns)
