@@ -14,8 +14,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-# Read once when the library loads: with a single rx worker, a peer that vanishes silently stalls the others.
-os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 8))")
+# Read once when the library loads. With a single rx worker, a peer that vanishes silently stalls the others. A link
+# lives where it was opened, in net or acc: unless rx is the same place, a second thread wakes up for every message.
+os.environ.setdefault(
+    "ZENOH_RUNTIME",
+    "(rx: (worker_threads: 8), net: (handover: rx), acc: (handover: rx), tx: (worker_threads: 2))",
+)
 
 import zenoh
 
