@@ -145,7 +145,8 @@ def soak(flight: ChaosFlight, seconds: float) -> bool:
         fault()
         took = recovery(flight)
         back.setdefault(name, []).append(took)
-        print(f"{end - time.monotonic():.0f} s left: {name}, all back after {took:.2f} s", flush=True)
+        left = end - time.monotonic()
+        print(f"{left:.0f} s left: {name}, all back after {took:.2f} s; {memory(flight, pids)}", flush=True)
         flight.recorder.listen(CALM_S)
         flight.recorder.forget(CALM_S)
     for name, times in sorted(back.items()):
@@ -157,6 +158,12 @@ def soak(flight: ChaosFlight, seconds: float) -> bool:
     wrong = referee["collisions"] > 0 or referee["fence_exits"] > 0 or bool(strangers)
     wrong |= any(took == float("inf") for times in back.values() for took in times)
     return grown(flight, before, pids) or wrong
+
+
+def memory(flight: ChaosFlight, pids: dict[str, int]) -> str:
+    """Says how much every process that was never killed holds now: a point of its curve."""
+    alive = [token for token, pid in sorted(pids.items()) if flight.processes[token].pid == pid]
+    return ", ".join(f"{token} {read_usage(pids[token]).rss_mb:.2f}" for token in alive) + " MB"
 
 
 def recovery(flight: ChaosFlight) -> float:
