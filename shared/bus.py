@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-# Read once when the library loads. With a single rx worker, a peer that vanishes silently stalls the others. A link
-# lives where it was opened, in net or acc: unless rx is the same place, a second thread wakes up for every message.
+# Read once when the library loads. With a single rx worker, a peer that vanishes silently stalls the others. Links
+# live where they were opened, in net or acc: unless rx is the same, a second thread wakes up for every message.
 os.environ.setdefault(
     "ZENOH_RUNTIME",
     "(rx: (worker_threads: 8), net: (handover: rx), acc: (handover: rx), tx: (worker_threads: 2))",
@@ -112,7 +112,6 @@ class ZenohBus:
 
     def subscribe(self, key_expression: str, inbox: Inbox) -> None:
         """See `Bus.subscribe`; the callback only stores bytes, decoding is the loop's work."""
-
         fixed = None if "*" in key_expression else key_expression
 
         def store(sample: zenoh.Sample) -> None:
