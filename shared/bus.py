@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-# Read once when the library loads. With a single rx worker, a peer that vanishes silently stalls the others. Links
-# live where they were opened, in net or acc: unless rx is the same, a second thread wakes up for every message.
+# Read once when the library loads. With a single rx worker, a peer that vanishes silently stalls the others.
+# Links live where they were opened, in net or acc: unless rx is the same, each message wakes two threads.
 os.environ.setdefault(
     "ZENOH_RUNTIME",
     "(rx: (worker_threads: 8), net: (handover: rx), acc: (handover: rx), tx: (worker_threads: 2))",
