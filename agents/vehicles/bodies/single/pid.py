@@ -3,8 +3,8 @@
 import math
 
 from agents.vehicles.bodies import pid
-from agents.vehicles.bodies.pid import DESCENT_PWM, PERIOD, ROUNDING
-from agents.vehicles.bodies.single.state import FLY, Body, clip
+from agents.vehicles.bodies.pid import DESCENT_PWM, PERIOD
+from agents.vehicles.bodies.single.state import FLY, bound
 from agents.vehicles.bodies.state import Command
 from shared.messages import Vector
 
@@ -18,45 +18,50 @@ _GROUND_INTEGRAL = pid.GROUND_INTEGRAL.tolist()
 
 
 def control(
-    body: Body, integral: Vector, kind: int, setpoint: Vector, axes: range, dt: float
-) -> tuple[Vector, Vector, Vector, float]:
-    """Runs the controller if its tick is due within this substep.
+    position: Vector,
+    integral: Vector,
+    error: Vector,
+    output: Vector,
+    kind: int,
+    setpoint: Vector,
+    axes: range,
+) -> tuple[Vector, Vector, Vector]:
+    """Makes one tick of the controller.
 
     Args:
-        body: Before the substep.
-        integral: Its integral, where something else than this PID has changed it, else its own.
+        position: Of the body, m.
+        integral: Of the error, m s.
+        error: At the last tick, m; NaN: it was not flying then.
+        output: Of the last tick.
         kind: Value of a `Command`.
         setpoint: m.
         axes: Axes that this PID flies; the others' integral and output are left alone.
-        dt: Substep, s.
 
     Returns:
-        Integral, error, output and wait of the body after the substep.
+        Integral, error and output after the tick.
     """
-    if body.wait > ROUNDING:
-        return (integral, body.error, body.output, body.wait - dt)
-    integrals, errors = [*integral], [*body.error]
-    outputs = [0.0, 0.0, _open_loop(body, kind)]
+    grounded = position[2] <= 0.0
+    integrals, errors = [*integral], [*error]
+    outputs = [0.0, 0.0, _open_loop(kind, output[2], grounded=grounded)]
     for axis in axes:
-        error = setpoint[axis] - body.position[axis] if kind == FLY else math.nan
-        limit = _INTEGRAL_LIMIT[axis]
-        if body.position[2] <= 0.0:
+        way = setpoint[axis] - position[axis] if kind == FLY else math.nan
+        if grounded:
             integrals[axis] = _GROUND_INTEGRAL[axis]
         elif kind == FLY:
-            integrals[axis] = clip(integrals[axis] + error * PERIOD, -limit, limit)
+            integrals[axis] = bound(integrals[axis] + way * PERIOD, _INTEGRAL_LIMIT[axis])
         if kind == FLY:
             previous = errors[axis]
-            rate = 0.0 if math.isnan(previous) else (error - previous) / PERIOD
+            rate = 0.0 if math.isnan(previous) else (way - previous) / PERIOD
             kp, kd, ki = _GAINS[axis]
-            wanted = kp * error + kd * rate + ki * integrals[axis]
-            outputs[axis] = clip(wanted, _OUTPUT_MIN[axis], _OUTPUT_MAX[axis])
-        errors[axis] = error
+            wanted = kp * way + kd * rate + ki * integrals[axis]
+            outputs[axis] = min(max(wanted, _OUTPUT_MIN[axis]), _OUTPUT_MAX[axis])
+        errors[axis] = way
     (a, b, c), (d, e, f), (g, h, i) = integrals, errors, outputs
-    return (a, b, c), (d, e, f), (g, h, i), body.wait + PERIOD - dt
+    return (a, b, c), (d, e, f), (g, h, i)
 
 
-def _open_loop(body: Body, kind: int) -> float:
+def _open_loop(kind: int, pwm: float, *, grounded: bool) -> float:
     """Returns the motor command without a position: the thrust that the command stands for."""
-    if kind == _CUT or (kind == _IDLE and body.position[2] <= 0.0):
+    if kind == _CUT or (kind == _IDLE and grounded):
         return 0.0
-    return DESCENT_PWM if kind in (_DESCEND, _IDLE) else body.output[2]
+    return DESCENT_PWM if kind in (_DESCEND, _IDLE) else pwm

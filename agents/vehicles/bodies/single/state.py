@@ -28,14 +28,15 @@ class Body(NamedTuple):
     wait: float
 
 
-OneStep = Callable[[Body, int, Vector, float], Body]
-"""Advances one body by one substep: body, kind of `Command`, set-point, substep."""
+Fly = Callable[[Body, int, Vector, float, int], Body]
+"""Advances one body with its command held: body, kind of `Command`, set-point, substep, number of substeps."""
 
 
 def apart(state: BodyState) -> list[Body]:
     """Returns the bodies, one per row."""
     arrays, wait = state[:-1], state.wait
-    rows = zip(*(array.tolist() for array in arrays), strict=True)
+    *vectors, thrust = arrays
+    rows = zip(*(map(tuple, array.tolist()) for array in vectors), thrust.tolist(), strict=True)
     return [Body._make((*numbers, wait)) for numbers in rows]
 
 
@@ -45,6 +46,6 @@ def together(bodies: Sequence[Body]) -> BodyState:
     return BodyState._make((*map(np.array, columns), waits[0]))
 
 
-def clip(value: float, low: float, high: float) -> float:
-    """Returns the nearest number between `low` and `high`."""
-    return low if value < low else high if value > high else value
+def bound(value: float, limit: float) -> float:
+    """Returns the nearest number between `-limit` and `limit`."""
+    return -limit if value < -limit else limit if value > limit else value
