@@ -23,6 +23,7 @@ from shared.codec import encode
 from shared.formation import Formation, Vec
 from shared.messages import DroneState, HandSample, Mode
 from shared.scenario import Scenario
+from shared.senses import Sensed
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
@@ -92,11 +93,13 @@ class Lockstep:
             for agent in self._listeners[key]:
                 agent.receive({key: [Arrival(payload, now_ns)]})
         elif isinstance(message, HandSample):
+            sample = Sensed(message, now_ns)
             for agent in self._listeners[key]:
-                agent.senses.hear_hand(message, now_ns)
+                agent.senses.hear_hand(sample)
         else:
+            state = Sensed(message, now_ns)
             for agent in self._listeners[key]:
-                agent.senses.hear_drone(message, now_ns)
+                agent.senses.hear_drone(state)
 
 
 def fly_lockstep(

@@ -7,6 +7,7 @@ import pytest
 from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.loop import PoseWatch, command, run
@@ -275,7 +276,7 @@ def test_each_mode_has_its_command(mode: Mode, order: str) -> None:
 
 
 def test_the_age_of_a_pose_counts_from_when_it_was_first_seen() -> None:
-    watch = PoseWatch(FakeVehicle([None, FLYING, FLYING, evolve(FLYING, seq=2)], threading.Event()))
+    watch = PoseWatch(FakeVehicle([None, FLYING, FLYING, replace(FLYING, seq=2)], threading.Event()))
     assert watch.read(T0) is None
     seen = [watch.read(T0 + tick * 100 * MS) for tick in range(1, 5)]
     assert [pair[1] for pair in seen if pair] == pytest.approx([0.0, 0.1, 0.0, 0.1])

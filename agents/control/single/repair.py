@@ -6,13 +6,13 @@ takes over, and gives back, step by step within a second; who returns has to be 
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 from attrs import frozen
+from msgspec import Struct
 
 from agents.control import modes
 from agents.control.hand import MappedHand
-from agents.control.single.goals import Row, goal_of
+from agents.control.single.goals import Guide, Row, goal_of
 from agents.control.single.impedance import AT_REST, LinkState, step_links
 from agents.control.single.vectors import Vector, norm
 from shared.messages import Mode
@@ -46,7 +46,7 @@ class Kin:
     heights: tuple[float, ...] | None
 
 
-class Reference(NamedTuple):
+class Reference(Struct, frozen=True):
     """An ancestor as last heard.
 
     Attributes:
@@ -66,7 +66,7 @@ class Reference(NamedTuple):
     fresh: bool
 
 
-class StandIn(NamedTuple):
+class StandIn(Struct, frozen=True):
     """How far an ancestor has been replaced.
 
     Attributes:
@@ -80,32 +80,19 @@ class StandIn(NamedTuple):
     links: tuple[LinkState, ...]
 
 
-class Guide(NamedTuple):
-    """What a drone follows in the place of one ancestor.
-
-    Attributes:
-        point: Where it is, or should be, m.
-        velocity: Its goal velocity, m/s.
-        follows: Whether it follows the hand, or whoever stands behind it does.
-    """
-
-    point: Vector
-    velocity: Vector
-    follows: bool
-
-
-def nobody_gone(kin: Sequence[Kin]) -> tuple[StandIn, ...]:
-    """Returns the state in which every ancestor speaks for itself."""
-    return tuple(_absent(each) for each in kin)
-
-
-def _absent(kin: Kin) -> StandIn:
-    return StandIn(0.0, 0.0, (AT_REST,) * len(kin.row.links))
-
-
 def is_fit(reference: Reference | None) -> bool:
     """Says whether an ancestor is heard and part of the formation."""
     return reference is not None and reference.age <= REFERENCE_LOST and reference.mode in modes.GUIDED_MODES
+
+
+def is_gone(reference: Reference | None) -> bool:
+    """Says whether an ancestor needs a stand-in."""
+    return reference is None or reference.age > REFERENCE_LOST or reference.mode in LEAVING_MODES
+
+
+def is_extrapolated(reference: Reference | None) -> bool:
+    """Says whether an ancestor has not been heard since the last step."""
+    return reference is not None and not reference.fresh
 
 
 def replace_lost(
@@ -118,40 +105,42 @@ def replace_lost(
     """Advances every ancestor's stand-in by one step.
 
     Args:
-        stand_ins: Before, one per ancestor.
+        stand_ins: Before, one per ancestor; none while all speak for themselves.
         kin: The ancestors.
         heard: What is known of each; None where never heard.
         hand_velocity: Mapped hand velocity in the formation's frame, m/s.
         dt: Time since the last step, s.
     """
-    return tuple(
+    before = stand_ins or [_absent(each) for each in kin]
+    after = tuple(
         [
             _advance(stand_in, each, reference, hand_velocity, dt)
-            if stand_in.share > 0.0 or _is_gone(reference)
+            if stand_in.share > 0.0 or is_gone(reference)
             else stand_in
-            for stand_in, each, reference in zip(stand_ins, kin, heard, strict=True)
+            for stand_in, each, reference in zip(before, kin, heard, strict=True)
         ]
     )
+    return after if any(each.share for each in after) else ()
+
+
+def _absent(kin: Kin) -> StandIn:
+    return StandIn(0.0, 0.0, (AT_REST,) * len(kin.row.links))
 
 
 def _advance(
     stand_in: StandIn, kin: Kin, reference: Reference | None, hand_velocity: Vector, dt: float
 ) -> StandIn:
-    share, heard_for, links = stand_in
+    share, heard_for = stand_in.share, stand_in.heard_for
     heard_for = heard_for + dt if is_fit(reference) else 0.0
     if reference is None:
         share = 1.0  # nothing to blend from: it was never there
-    elif _is_gone(reference) or heard_for < RETURN_AFTER:
+    elif is_gone(reference) or heard_for < RETURN_AFTER:
         share = min(share + dt / BLEND, 1.0)
     else:
         share -= dt / BLEND
     if share <= 0.0:
         return _absent(kin)
-    return StandIn(share, heard_for, step_links(links, kin.row.links, hand_velocity, dt))
-
-
-def _is_gone(reference: Reference | None) -> bool:
-    return reference is None or reference.age > REFERENCE_LOST or reference.mode in LEAVING_MODES
+    return StandIn(share, heard_for, step_links(stand_in.links, kin.row.links, hand_velocity, dt))
 
 
 def guides(
@@ -173,8 +162,6 @@ def guides(
     Returns:
         None in the place of an ancestor that is neither fit nor replaced: it has not joined yet.
     """
-    if not any(stand_in.share for stand_in in stand_ins):
-        return [guide_of(reference) for reference in heard[:wanted]]
     known: dict[int, Guide | None] = {}
     return [_guide(place, stand_ins, kin, heard, hand, known) for place in range(wanted)]
 
@@ -213,8 +200,7 @@ def _stand_in(
     present = [guide for guide in behind if guide is not None]
     if len(present) < len(behind):
         return None
-    points, velocities = [guide.point for guide in present], [guide.velocity for guide in present]
-    point, velocity = goal_of(kin.row, links, hand, points, velocities, kin.heights)
+    point, velocity = goal_of(kin.row, links, hand, present, kin.heights)
     return Guide(point, velocity, all(guide.follows for guide in present))
 
 

@@ -1,13 +1,14 @@
 """The reference trajectory of one drone, see `agents.control.trajectory`."""
 
 import math
-from typing import NamedTuple
+
+from msgspec import Struct
 
 from agents.control.single.vectors import ORIGIN, Vector, shorten
 from agents.control.trajectory import BRAKING_SHARE
 
 
-class Trajectory(NamedTuple):
+class Trajectory(Struct, frozen=True):
     """Reference of one drone.
 
     Attributes:
@@ -44,8 +45,8 @@ def tracking_velocity(trajectory: Trajectory, goal: Vector, dt: float, accelerat
     distance = math.hypot(ex, ey, ez)
     if distance == 0.0:
         return ((gx - x) / dt, (gy - y) / dt, (gz - z) / dt)
-    closing = min(distance / dt, math.sqrt(2.0 * BRAKING_SHARE * acceleration * distance))
-    share = closing / max(distance, 1e-12)
+    at_once, braked = distance / dt, math.sqrt(2.0 * BRAKING_SHARE * acceleration * distance)
+    share = (at_once if at_once < braked else braked) / (distance if distance > 1e-12 else 1e-12)
     return ((gx - x) / dt + ex * share, (gy - y) / dt + ey * share, (gz - z) / dt + ez * share)
 
 
