@@ -12,7 +12,7 @@ from agents.stepping import due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
 from shared.formation import Formation
-from shared.messages import NO_HAND, DroneState, HandSample
+from shared.messages import NO_HAND, DroneState, HandSample, Heard
 from shared.net.keyring import hand_verifier
 from shared.nodes import neighbours
 from shared.scenario import Scenario
@@ -52,7 +52,7 @@ class Agent:
         self._epoch = epoch
         self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
         self._kin = {kin.drone: DRONE_STATE.key(id=kin.drone) for kin in settings.kin}
-        self._links = [(i, link.name) for i, link in enumerate(settings.row.links)]
+        self._links = [link.name for link in settings.row.links]
         self._settings = settings
         self._rule = step_rule(scenario.rates)
         self._nominal_dt = 1.0 / scenario.rates.control_hz
@@ -89,8 +89,8 @@ class Agent:
         dt = (now_ns - self._last_step_ns) / NS_PER_S if self.steps else self._nominal_dt
         inputs = self._inputs(now_ns, pose, pose_age)
         self._state, output = step(self._state, inputs, self._settings, dt)
-        self._used = self._used_now(self._state)
         self._last_step_ns = now_ns
+        links = self._state.links
         state = DroneState(
             epoch=self._epoch,
             seq=self.steps,
@@ -102,11 +102,11 @@ class Agent:
             goal_velocity=output.goal_velocity,
             setpoint=output.setpoint,
             mode=self._state.mode.mode,
-            displacements={name: self._state.links[i].displacement for i, name in self._links},
+            displacements={name: links[i].displacement for i, name in enumerate(self._links)},
             pose_age=pose_age,
             battery=pose.battery,
             flags=output.flags,
-            heard={key: sensed.heard for key, sensed in self._used.items()},
+            heard=self._note_used(self._state),
             step_ns=now_ns,
         )
         self.steps += 1
@@ -163,14 +163,15 @@ class Agent:
             fresh=self._is_fresh(key, sensed),
         )
 
-    def _used_now(self, state: State) -> dict[str, Sensed[HandSample] | Sensed[DroneState]]:
-        """Returns what this step used: the hand, the references, and who stands behind one that is gone."""
+    def _note_used(self, state: State) -> dict[str, Heard]:
+        """Notes, and returns, what this step used: hand, references, and who stands behind one that is gone."""
         hand, drones = self.senses.hand, self.senses.drones
         used: dict[str, Sensed[HandSample] | Sensed[DroneState]] = {} if hand is None else {HAND_KEY: hand}
         for other, key in (self._kin if state.stand_ins else self._references).items():
             if other in drones:
                 used[key] = drones[other]
-        return used
+        self._used = used
+        return {key: sensed.heard for key, sensed in used.items()}
 
 
 def _has_used(state: DroneState, hand: HandSample) -> bool:

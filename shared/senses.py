@@ -127,8 +127,8 @@ def _check_newer(sensed: Sensed[M], known: Sensed[M] | None, stale_s: float) -> 
     if known is None:
         return
     message, last = sensed.message, known.message
-    if (message.epoch, message.seq) > (last.epoch, last.seq):
+    if message.epoch == last.epoch and message.seq > last.seq:
         return
-    if message.epoch < last.epoch and known.age(sensed.arrival_ns) > stale_s:
+    if message.epoch > last.epoch or (message.epoch < last.epoch and known.age(sensed.arrival_ns) > stale_s):
         return
     raise DecodeError("out-of-order", f"({message.epoch}, {message.seq}) after ({last.epoch}, {last.seq})")

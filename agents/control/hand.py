@@ -85,10 +85,13 @@ def map_hand(previous: MappedHand | None, sample: HandInput, settings: HandSetti
     yaw = sample.yaw if settings.hand.follow_yaw else 0.0
     if previous is None:
         return MappedHand(target, shorten(velocity, settings.hand.max_speed), yaw, 0.0, sample.stamp)
-    dt = min(max(sample.stamp - previous.stamp, 0.0), MAX_SAMPLE_GAP)
+    gap = sample.stamp - previous.stamp
+    dt = 0.0 if gap < 0.0 else MAX_SAMPLE_GAP if gap > MAX_SAMPLE_GAP else gap
     point, velocity = _chase(previous.point, target, velocity, settings.hand.max_speed, dt)
-    turned, yaw_rate = _turn(previous.yaw, yaw, OUTERMOST_SPEED / max(settings.radius, 0.1), dt)
-    return MappedHand(point, velocity, turned, yaw_rate, sample.stamp)
+    yaw_rate = 0.0
+    if yaw != previous.yaw:
+        yaw, yaw_rate = _turn(previous.yaw, yaw, OUTERMOST_SPEED / max(settings.radius, 0.1), dt)
+    return MappedHand(point, velocity, yaw, yaw_rate, sample.stamp)
 
 
 def freeze(mapped: MappedHand) -> MappedHand:

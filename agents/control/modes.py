@@ -28,6 +28,10 @@ CRITICAL_BATTERY = 0.1
 TOUCHDOWN = 0.06
 """Below this height a landing drone is on the ground, m."""
 
+# Python takes as long to find a member in its enumeration as for a dozen sums; every step asks for these.
+FOLLOW, STOP = Mode.FOLLOW, Mode.STOP
+_WISH_FLY, _WISH_HOLD, _WISH_STOP = Wish.FLY, Wish.HOLD, Wish.STOP
+
 AIRBORNE_MODES = frozenset({Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND})
 _FLYING_MODES = AIRBORNE_MODES - {Mode.LAND}
 GUIDED_MODES = frozenset({Mode.FOLLOW, Mode.HOLD})
@@ -77,12 +81,12 @@ def initial_mode(*, airborne: bool) -> ModeState:
 
 def next_mode(state: ModeState, inputs: ModeInputs) -> ModeState:
     """Returns the mode after one step."""
-    if state.mode is Mode.STOP or inputs.wish is Wish.STOP:
+    if state.mode is STOP or inputs.wish is _WISH_STOP:
         return replace(state, mode=Mode.STOP)
-    if state.must_ask_again and inputs.hand_age <= HAND_STALE and inputs.wish is not Wish.FLY:
+    if state.must_ask_again and inputs.hand_age <= HAND_STALE and inputs.wish is not _WISH_FLY:
         state = replace(state, must_ask_again=False)
     empty = inputs.battery <= CRITICAL_BATTERY
-    if state.mode in _FLYING_MODES and (empty or inputs.pose_age > POSE_LOST):
+    if (empty or inputs.pose_age > POSE_LOST) and state.mode in _FLYING_MODES:
         return replace(state, mode=Mode.LAND, must_ask_again=empty or state.must_ask_again)
     return _NEXT[state.mode](state, inputs)
 
@@ -104,7 +108,7 @@ def _takeoff(state: ModeState, inputs: ModeInputs) -> ModeState:
 def _follow(state: ModeState, inputs: ModeInputs) -> ModeState:
     if _landing_wished(inputs) or inputs.hand_age > HAND_LAND:
         return _land(state, inputs)
-    held = inputs.wish is Wish.HOLD or inputs.hand_age > HAND_HOLD or not inputs.references_follow
+    held = inputs.wish is _WISH_HOLD or inputs.hand_age > HAND_HOLD or not inputs.references_follow
     return replace(state, mode=Mode.HOLD) if held else state
 
 
@@ -130,7 +134,7 @@ def _landing_wished(inputs: ModeInputs) -> bool:
 
 
 def _flown_by_hand(inputs: ModeInputs) -> bool:
-    return inputs.wish is Wish.FLY and inputs.hand_age <= HAND_STALE
+    return inputs.wish is _WISH_FLY and inputs.hand_age <= HAND_STALE
 
 
 def _may_follow(inputs: ModeInputs) -> bool:

@@ -1,7 +1,6 @@
 """One control step of one drone: mode, hand, links, goal, steering. State and time in, state and output out."""
 
 import math
-import operator
 from collections.abc import Sequence
 
 from attrs import frozen
@@ -19,7 +18,6 @@ from agents.control.single.repair import (
     StandIn,
     guide_of,
     guides,
-    is_extrapolated,
     is_gone,
     replace_lost,
 )
@@ -36,7 +34,6 @@ BLOCKED_TIME = 2.0
 
 _JOINING_MODES = frozenset({Mode.GROUND, Mode.TAKEOFF})
 _REPAIRED_MODES = modes.GUIDED_MODES | {Mode.TAKEOFF}
-_follows = operator.attrgetter("follows")
 
 
 @frozen(kw_only=True)
@@ -170,7 +167,7 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
 
     trajectory = state.trajectory if mode in modes.AIRBORNE_MODES else start_at(inputs.position)
     steered = steer(trajectory, goal, goal_velocity, _surroundings(inputs), settings.steering, dt)
-    late = mode is Mode.FOLLOW and math.dist(goal, inputs.position) > BLOCKED_ERROR
+    late = mode is modes.FOLLOW and math.dist(goal, inputs.position) > BLOCKED_ERROR
     blocked_for = state.blocked_for + dt if late else 0.0
     flags = _flags(inputs, steered, inputs.references[:direct], stand_ins[:direct], usable=lead is not None)
     if blocked_for > BLOCKED_TIME:
@@ -198,8 +195,12 @@ def _lead(
     else:
         # Without a hand there is no goal; all that counts is whether the references hold or follow.
         found = [guide_of(reference) for reference in inputs.references[:direct]]
-    lead = [guide for guide in found if guide is not None]
-    return lead if len(lead) == direct else None
+    lead = []
+    for guide in found:
+        if guide is None:
+            return None
+        lead.append(guide)
+    return lead
 
 
 def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Guide] | None) -> ModeInputs:
@@ -211,7 +212,7 @@ def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Gu
         battery=inputs.battery,
         height=state.anchor[2] if lost else inputs.position[2],
         takeoff_height=settings.takeoff_height,
-        references_follow=lead is not None and all(map(_follows, lead)),
+        references_follow=lead is not None and all(guide.mode is modes.FOLLOW for guide in lead),
     )
 
 
@@ -223,10 +224,10 @@ def _hand(state: State, inputs: Inputs, mode: Mode, settings: HandSettings) -> M
     mapped, sample = state.hand, inputs.hand
     if (mapped is None or mode in _JOINING_MODES) and sample is not None and inputs.wish is Wish.FLY:
         adopted = map_hand(None, sample, settings)
-        return adopted if mode is Mode.FOLLOW else freeze(adopted)
+        return adopted if mode is modes.FOLLOW else freeze(adopted)
     if mapped is None:
         return None
-    if sample is None or mode is not Mode.FOLLOW or inputs.hand_age > modes.HAND_STALE:
+    if sample is None or mode is not modes.FOLLOW or inputs.hand_age > modes.HAND_STALE:
         return freeze(mapped)
     return map_hand(mapped, sample, settings) if inputs.hand_fresh else mapped
 
@@ -264,8 +265,9 @@ def _flags(
     usable: bool,
 ) -> Flag:
     flags = NO_FLAGS
-    if any(map(is_extrapolated, references)):
-        flags |= Flag.EXTRAPOLATING
+    for reference in references:
+        if reference is not None and not reference.fresh:
+            flags |= Flag.EXTRAPOLATING
     if stand_ins and any(stand_in.share for stand_in in stand_ins):
         flags |= Flag.REPAIRED
     if not usable:

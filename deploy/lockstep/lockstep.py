@@ -18,7 +18,8 @@ from agents.vehicles.bodies.state import Command
 from deploy.lockstep.hand_track import track_hand
 from deploy.lockstep.record import Moment, Record, make_record
 from deploy.lockstep.start import rest_places, start_fleet
-from deploy.lockstep.ticks import tick_length, tick_ns
+from deploy.lockstep.ticks import tick_ns
+from shared.clock import NS_PER_S
 from shared.codec import encode
 from shared.formation import Formation, Vec
 from shared.messages import DroneState, HandSample, Mode
@@ -27,6 +28,7 @@ from shared.senses import Sensed
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
+_HAND_KEY = HAND.key()
 _COMMANDS = dict.fromkeys(Mode, Command.FLY.value)
 _COMMANDS |= {Mode.STOP: Command.CUT.value, Mode.GROUND: Command.IDLE.value}
 
@@ -59,8 +61,8 @@ class Lockstep:
         ]
         self._keys = [DRONE_STATE.key(id=drone) for drone in formation.ids]
         self._listeners = {
-            key: [agent for agent in self._agents if key in agent.senses.keys]
-            for key in (HAND.key(), *self._keys)
+            key: [agent.senses for agent in self._agents if key in agent.senses.keys]
+            for key in (_HAND_KEY, *self._keys)
         }
 
     def advance(self, sample: HandSample) -> list[DroneState]:
@@ -73,13 +75,13 @@ class Lockstep:
             What each drone published, in the formation's order.
         """
         now = tick_ns(self.tick, self._rate)
-        self._publish(HAND.key(), sample, now)
+        self._publish(_HAND_KEY, sample, now)
         states: dict[int, DroneState] = {}
         for row in self._order:
             states[row] = self._agents[row].step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
             self._publish(self._keys[row], states[row], now)
         ordered = [states[row] for row in range(len(states))]
-        duration = tick_length(self.tick, self._rate)
+        duration = (tick_ns(self.tick + 1, self._rate) - now) / NS_PER_S
         self.flyers = [
             advance_flyer(self.flyers[row], _COMMANDS[state.mode], state.setpoint, duration)
             for row, state in enumerate(ordered)
@@ -90,16 +92,16 @@ class Lockstep:
     def _publish(self, key: str, message: HandSample | DroneState, now_ns: int) -> None:
         if self._encoded:
             self.payloads[key] = payload = encode(message)
-            for agent in self._listeners[key]:
-                agent.receive({key: [Arrival(payload, now_ns)]})
+            for senses in self._listeners[key]:
+                senses.take({key: [Arrival(payload, now_ns)]})
         elif isinstance(message, HandSample):
             sample = Sensed(message, now_ns)
-            for agent in self._listeners[key]:
-                agent.senses.hear_hand(sample)
+            for senses in self._listeners[key]:
+                senses.hear_hand(sample)
         else:
             state = Sensed(message, now_ns)
-            for agent in self._listeners[key]:
-                agent.senses.hear_drone(state)
+            for senses in self._listeners[key]:
+                senses.hear_drone(state)
 
 
 def fly_lockstep(

@@ -105,11 +105,12 @@ def threats(
     radius, lead = bubble.radius, bubble.lead
     found = []
     for ox, oy, ou, ov in others:
-        dx, dy, du, dv = x - ox, y - oy, ou - u, ov - v
+        dx, dy = x - ox, y - oy
+        du, dv = ou - u, ov - v
         squared = dx * dx + dy * dy
-        outside = 0.5 * (squared - radius * radius)
-        # distance (distance - radius) is larger than that: no root is needed to see that it is far enough.
-        if outside > 0.0 and lead * (du * dx + dv * dy) < outside:
+        outside = squared - radius * radius
+        # No root is needed to see that it is far enough: 2 distance (distance - radius) is larger than that.
+        if outside > 0.0 and 2.0 * lead * (du * dx + dv * dy) < outside:
             continue
         distance = math.sqrt(squared)
         hx, hy = (dx / distance, dy / distance) if distance > COINCIDENT else (1.0, 0.0)

@@ -10,7 +10,7 @@ from agents.control.hand import MappedHand
 from agents.control.single.impedance import LinkState
 from agents.control.single.vectors import Vector, clamp, rotate, vector
 from shared.formation import Formation, Link
-from shared.messages import MAX_POSITION, MAX_VELOCITY
+from shared.messages import MAX_POSITION, MAX_VELOCITY, Mode
 
 
 class Guide(Struct, frozen=True):
@@ -18,13 +18,13 @@ class Guide(Struct, frozen=True):
 
     Attributes:
         point: Where it is, or should be, m.
-        velocity: Its goal velocity, m/s.
-        follows: Whether it follows the hand, or whoever stands behind it does.
+        goal_velocity: m/s.
+        mode: Its mode, or that of whoever stands behind it.
     """
 
     point: Vector
-    velocity: Vector
-    follows: bool
+    goal_velocity: Vector
+    mode: Mode
 
 
 @frozen(kw_only=True)
@@ -64,15 +64,15 @@ def correction(row: Row, states: Sequence[LinkState]) -> tuple[Vector, Vector]:
     x = y = z = u = v = w = 0.0
     for i, link in enumerate(row.links):
         (dx, dy, dz), (rx, ry, rz), limit = states[i].displacement, states[i].rate, link.limit
-        if -limit <= dx <= limit:
+        if abs(dx) <= limit:
             x, u = x + dx, u + rx
         else:
             x += math.copysign(limit, dx)
-        if -limit <= dy <= limit:
+        if abs(dy) <= limit:
             y, v = y + dy, v + ry
         else:
             y += math.copysign(limit, dy)
-        if -limit <= dz <= limit:
+        if abs(dz) <= limit:
             z, w = z + dz, w + rz
         else:
             z += math.copysign(limit, dz)
@@ -99,29 +99,25 @@ def goal_of(
         lead: Its references.
         heights: Their rest heights above the hand, m; None uses those of their points.
     """
-    (gx, gy, gz), (gu, gv, gw) = _place(row, links, hand)
+    (ox, oy, oz), yaw, turning = row.offset, hand.yaw, hand.yaw_rate
+    (x, y, z), (u, v, w) = correction(row, links)
+    x, y, z = ox + x, oy + y, oz + z
+    gx, gy, gz = rotate((x, y, z), yaw)
+    gu, gv, gw = rotate((u - turning * y, v + turning * x, w), yaw)
     weight, (x, y, z), (u, v, w) = row.weights[0], hand.point, hand.velocity
     x, y, z, u, v, w = weight * x, weight * y, weight * z, weight * u, weight * v, weight * w
     for i, guide in enumerate(lead):
-        weight, (a, b, c), (d, e, f) = row.weights[i + 1], guide.point, guide.velocity
+        weight, (a, b, c), (d, e, f) = row.weights[i + 1], guide.point, guide.goal_velocity
         if heights is not None:
             c = hand.point[2] + heights[i]
         x, y, z = x + weight * a, y + weight * b, z + weight * c
         u, v, w = u + weight * d, v + weight * e, w + weight * f
     # A goal that no receiver would accept, because a reference is at the edge of the range, helps nobody.
-    goal, velocity = (x + gx, y + gy, z + gz), (u + gu, v + gv, w + gw)
-    return _within(goal, MAX_POSITION), _within(velocity, MAX_VELOCITY)
+    return _within(x + gx, y + gy, z + gz, MAX_POSITION), _within(u + gu, v + gv, w + gw, MAX_VELOCITY)
 
 
-def _place(row: Row, links: Sequence[LinkState], hand: MappedHand) -> tuple[Vector, Vector]:
-    """Returns where the goal is from its references, world frame, m, and how fast that changes, m/s."""
-    (x, y, z), ((a, b, c), (u, v, w)) = row.offset, correction(row, links)
-    x, y, z, turning = x + a, y + b, z + c, hand.yaw_rate
-    return rotate((x, y, z), hand.yaw), rotate((u - turning * y, v + turning * x, w), hand.yaw)
-
-
-def _within(vector: Vector, limit: float) -> Vector:
+def _within(x: float, y: float, z: float, limit: float) -> Vector:
     """Returns the nearest vector whose components are at most `limit`."""
-    if math.hypot(*vector) <= limit:
-        return vector
-    return clamp(vector, (-limit, -limit, -limit), (limit, limit, limit))
+    if math.hypot(x, y, z) <= limit:
+        return (x, y, z)
+    return clamp((x, y, z), (-limit, -limit, -limit), (limit, limit, limit))

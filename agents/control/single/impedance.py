@@ -30,14 +30,12 @@ def step_links(
         hand_velocity: Mapped hand velocity in the formation's frame, m/s, held over the step.
         dt: Step, s, > 0.
     """
-    return tuple([_step_link(states[i], link, hand_velocity, dt) for i, link in enumerate(links)])
-
-
-def _step_link(state: LinkState, link: Link, hand_velocity: Vector, dt: float) -> LinkState:
-    a00, a01, a10, a11, b0, b1 = discretise(link.mass, link.damping, link.stiffness, link.gain, dt)
-    (x, y, z), (u, v, w) = state.displacement, state.rate
     hx, hy, hz = hand_velocity
-    return LinkState(
-        (a00 * x + a01 * u + b0 * hx, a00 * y + a01 * v + b0 * hy, a00 * z + a01 * w + b0 * hz),
-        (a10 * x + a11 * u + b1 * hx, a10 * y + a11 * v + b1 * hy, a10 * z + a11 * w + b1 * hz),
-    )
+    stepped = []
+    for i, link in enumerate(links):
+        a00, a01, a10, a11, b0, b1 = discretise(link.mass, link.damping, link.stiffness, link.gain, dt)
+        (x, y, z), (u, v, w) = states[i].displacement, states[i].rate
+        displacement = (a00 * x + a01 * u + b0 * hx, a00 * y + a01 * v + b0 * hy, a00 * z + a01 * w + b0 * hz)
+        rate = (a10 * x + a11 * u + b1 * hx, a10 * y + a11 * v + b1 * hy, a10 * z + a11 * w + b1 * hz)
+        stepped.append(LinkState(displacement, rate))
+    return tuple(stepped)

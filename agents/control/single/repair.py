@@ -46,22 +46,16 @@ class Kin:
     heights: tuple[float, ...] | None
 
 
-class Reference(Struct, frozen=True):
-    """An ancestor as last heard.
+class Reference(Guide, frozen=True):
+    """An ancestor as last heard: its position (`paper`) or goal (`stable`), goal velocity and mode.
 
     Attributes:
-        point: Its position (`paper`) or goal (`stable`), m.
-        velocity: The rate of that, m/s.
-        goal_velocity: Its broadcast goal velocity, m/s.
-        mode: Its mode.
+        velocity: How fast its point moves, m/s.
         age: Time since its sample arrived, s.
         fresh: Whether the sample is newer than the one of the last step.
     """
 
-    point: Vector
     velocity: Vector
-    goal_velocity: Vector
-    mode: Mode
     age: float
     fresh: bool
 
@@ -88,11 +82,6 @@ def is_fit(reference: Reference | None) -> bool:
 def is_gone(reference: Reference | None) -> bool:
     """Says whether an ancestor needs a stand-in."""
     return reference is None or reference.age > REFERENCE_LOST or reference.mode in LEAVING_MODES
-
-
-def is_extrapolated(reference: Reference | None) -> bool:
-    """Says whether an ancestor has not been heard since the last step."""
-    return reference is not None and not reference.fresh
 
 
 def replace_lost(
@@ -190,7 +179,9 @@ def guide_of(reference: Reference | None) -> Guide | None:
 
 
 def _own(reference: Reference) -> Guide:
-    return Guide(extrapolated(reference), reference.goal_velocity, reference.mode is Mode.FOLLOW)
+    if reference.fresh:
+        return reference
+    return Guide(_extrapolated(reference), reference.goal_velocity, reference.mode)
 
 
 def _stand_in(
@@ -201,7 +192,8 @@ def _stand_in(
     if len(present) < len(behind):
         return None
     point, velocity = goal_of(kin.row, links, hand, present, kin.heights)
-    return Guide(point, velocity, all(guide.follows for guide in present))
+    follows = all(guide.mode is Mode.FOLLOW for guide in present)
+    return Guide(point, velocity, Mode.FOLLOW if follows else Mode.HOLD)
 
 
 def _blend(own: Guide | None, stand_in: Guide | None, share: float) -> Guide | None:
@@ -209,8 +201,8 @@ def _blend(own: Guide | None, stand_in: Guide | None, share: float) -> Guide | N
         return stand_in
     return Guide(
         _between(own.point, stand_in.point, share),
-        _between(own.velocity, stand_in.velocity, share),
-        stand_in.follows,
+        _between(own.goal_velocity, stand_in.goal_velocity, share),
+        stand_in.mode,
     )
 
 
@@ -219,10 +211,8 @@ def _between(a: Vector, b: Vector, share: float) -> Vector:
     return (x + share * (u - x), y + share * (v - y), z + share * (w - z))
 
 
-def extrapolated(reference: Reference) -> Vector:
+def _extrapolated(reference: Reference) -> Vector:
     """Returns where a silent reference would be by now, at most 0.25 m from where it was last."""
-    if reference.fresh:
-        return reference.point
     speed = norm(reference.velocity)
     seconds = min(reference.age, EXTRAPOLATION / speed) if speed > 0.0 else 0.0
     (x, y, z), (u, v, w) = reference.point, reference.velocity

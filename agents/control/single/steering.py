@@ -130,19 +130,20 @@ def steer(
     chasing = HAND_SPEED_FACTOR * around.hand_speed
     speed = chasing if chasing > limits.speed else limits.speed
     u, v, w = wanted
-    moved = advance(trajectory, inside, (u + pu, v + pv, w), dt, speed, acceleration)
-    point = clamp(moved.point, low, high)
+    reached, velocity = advance(trajectory, (u + pu, v + pv, w), dt, speed, acceleration)
+    point = clamp(reached, low, high)
     avoiding = escaping or column_near
-    wish = moved.velocity if avoiding or not _on_goal(moved) else shorten(goal_velocity, speed)
-    share = _lead_share(escaping, around.hand_speed, settings)
+    on_goal = math.dist(reached, inside) < ON_GOAL
+    wish = shorten(goal_velocity, speed) if on_goal and not avoiding else velocity
+    share = 1.0 if escaping or settings.always_lead else _lead_share(around.hand_speed, settings.lead_above)
     a, b, c = wish
     lead = approach(trajectory.lead, (share * a, share * b, share * c), acceleration * dt)
     tau, (x, y, z), (a, b, c) = settings.tau, point, lead
     return Steered(
-        Trajectory(point, moved.velocity, lead, inside),
+        Trajectory(point, velocity, lead, inside),
         clamp((x + tau * a, y + tau * b, z + tau * c), low, high),
         avoiding,
-        inside != goal or point != moved.point,
+        inside != goal or point != reached,
     )
 
 
@@ -186,18 +187,16 @@ def _keep_off(
     which never give way, have the last word.
     """
     point, body, flying = trajectory.point, around.position, around.velocity
-    field = settings.avoidance.separation
     pressing = [avoidance.threats(body, flying, around.drones, DRONE_BUBBLE)]
     for silent in around.silent:
         wider = evolve(DRONE_BUBBLE, radius=silent.radius)
         pressing.append(avoidance.threats(body, flying, [(silent.x, silent.y, 0.0, 0.0)], wider))
-    u, v = avoidance.separation(point, around.drones, field)
+    others = around.drones
     if around.hand is not None:
-        hand = (around.hand,)
+        hand, others = (around.hand,), (*around.drones, around.hand)
         pressing.append(avoidance.threats(point, trajectory.velocity, hand, HAND_BUBBLE))
         pressing.append(avoidance.threats(body, flying, hand, HAND_BUBBLE))
-        a, b = avoidance.separation(point, hand, field)
-        u, v = u + a, v + b
+    u, v = avoidance.separation(point, others, settings.avoidance.separation)
     if settings.columns:
         columns = avoidance.columns_near(body, flying, settings.columns, COLUMN_BUBBLE)
         pressing.append(avoidance.threats(body, flying, columns, COLUMN_BUBBLE))
@@ -205,7 +204,7 @@ def _keep_off(
         return (u, v)
     for _ in range(ROUNDS):
         before = (u, v)
-        for each in pressing:
+        for each in filter(None, pressing):
             a, b = avoidance.escape((wanted[0] + u, wanted[1] + v), each)
             u, v = u + a, v + b
         if (u, v) == before:
@@ -213,13 +212,7 @@ def _keep_off(
     return (u, v)
 
 
-def _on_goal(trajectory: Trajectory) -> bool:
-    return math.dist(trajectory.point, trajectory.goal) < ON_GOAL
-
-
-def _lead_share(escaping: bool, hand_speed: float, settings: SteeringSettings) -> float:
-    """Returns how much of the lead is used: all under `stable`, what safety needs under `paper`."""
-    if settings.always_lead or escaping:
-        return 1.0
-    excess = (hand_speed - settings.lead_above) / (0.25 * settings.lead_above)
+def _lead_share(hand_speed: float, lead_above: float) -> float:
+    """Returns how much of the lead is used under `paper`: what safety needs."""
+    excess = (hand_speed - lead_above) / (0.25 * lead_above)
     return min(max(excess, 0.0), 1.0)

@@ -51,25 +51,31 @@ def tracking_velocity(trajectory: Trajectory, goal: Vector, dt: float, accelerat
 
 
 def advance(
-    trajectory: Trajectory, goal: Vector, wanted: Vector, dt: float, speed: float, acceleration: float
-) -> Trajectory:
+    trajectory: Trajectory, wanted: Vector, dt: float, speed: float, acceleration: float
+) -> tuple[Vector, Vector]:
     """Moves the reference with the wanted velocity as far as the limits allow.
 
     Args:
         trajectory: Reference before the step.
-        goal: Goal of this step, m.
         wanted: Wanted velocity, m/s.
         dt: Step, s.
         speed: Limit, m/s.
         acceleration: Limit, m/s^2.
+
+    Returns:
+        Its point and velocity after the step.
     """
     u, v, w = velocity = approach(trajectory.velocity, shorten(wanted, speed), acceleration * dt)
     x, y, z = trajectory.point
-    return Trajectory((x + u * dt, y + v * dt, z + w * dt), velocity, trajectory.lead, goal)
+    return (x + u * dt, y + v * dt, z + w * dt), velocity
 
 
 def approach(velocity: Vector, wanted: Vector, largest: float) -> Vector:
     """Changes a velocity towards a wanted one by at most `largest`, m/s."""
     (u, v, w), (a, b, c) = velocity, wanted
-    du, dv, dw = shorten((a - u, b - v, c - w), largest)
+    du, dv, dw = a - u, b - v, c - w
+    change = math.hypot(du, dv, dw)
+    if change > largest:
+        share = largest / change
+        return (u + du * share, v + dv * share, w + dw * share)
     return (u + du, v + dv, w + dw)

@@ -1,6 +1,7 @@
 """The bodies of a fleet one by one, see `agents.vehicles.bodies.fleet`."""
 
-from typing import NamedTuple
+from msgspec import Struct
+from msgspec.structs import replace
 
 from agents.vehicles.base import Pose
 from agents.vehicles.bodies.advance import BODIES, ONE_BY_ONE, advance_one
@@ -10,7 +11,7 @@ from agents.vehicles.bodies.state import AIRBORNE_HEIGHT
 from shared.messages import ORIGIN, Vector
 
 
-class Flyer(NamedTuple):
+class Flyer(Struct, frozen=True):
     """One body of a fleet, its type, and whether a hand holds it in place."""
 
     body: Body
@@ -37,11 +38,10 @@ def advance_flyer(flyer: Flyer, kind: int, setpoint: Vector, duration: float) ->
         setpoint: m.
         duration: s, >= 0.
     """
-    before, fly, held = flyer
-    after = advance_one(fly, before, kind, setpoint, duration)
-    if held:
-        after = after._replace(position=before.position, velocity=ORIGIN)
-    return Flyer(after, fly, held)
+    body = advance_one(flyer.fly, flyer.body, kind, setpoint, duration)
+    if flyer.held:
+        body = replace(body, position=flyer.body.position, velocity=ORIGIN)
+    return Flyer(body, flyer.fly, flyer.held)
 
 
 def pose_of(flyer: Flyer, charge: float, seq: int) -> Pose:
@@ -52,5 +52,5 @@ def pose_of(flyer: Flyer, charge: float, seq: int) -> Pose:
         charge: Of its battery, 0..1.
         seq: Number of this report.
     """
-    position, velocity, *_ = flyer.body
-    return Pose(position, velocity, 0.0, charge, position[2] > AIRBORNE_HEIGHT, seq)
+    position = flyer.body.position
+    return Pose(position, flyer.body.velocity, 0.0, charge, position[2] > AIRBORNE_HEIGHT, seq)

@@ -12,8 +12,8 @@ from agents.vehicles.bodies.identified import (
 )
 from agents.vehicles.bodies.pid import PERIOD, ROUNDING
 from agents.vehicles.bodies.single.airframe import move
-from agents.vehicles.bodies.single.pid import VERTICAL, control
-from agents.vehicles.bodies.single.state import FLY, Body, bound
+from agents.vehicles.bodies.single.pid import X, Y, Z, control, open_loop
+from agents.vehicles.bodies.single.state import FLY, Body
 from shared.messages import Vector
 
 
@@ -27,28 +27,39 @@ def fly(body: Body, kind: int, setpoint: Vector, dt: float, substeps: int) -> Bo
         dt: Substep, s, at most the controller's 0.02.
         substeps: How many.
     """
-    position, velocity, integral, error, output, tilt, tilt_rate, thrust, wait = body
-    wanted_x, wanted_y, _ = setpoint
-    steady, lag = thrust_of(output[2]), math.exp(-dt / MOTOR_LAG)
+    (x, y, z), (u, v, w), thrust, wait = body.position, body.velocity, body.thrust, body.wait
+    (a, b, c), (ex, ey, ez), pwm = body.integral, body.error, body.output[Z]
+    wanted_x, wanted_y, wanted_z = setpoint
+    flying = kind == FLY
+    steady, lag = thrust_of(pwm), math.exp(-dt / MOTOR_LAG)
     for _ in range(substeps):
-        (x, y, z), (u, v, _), (a, b, c) = position, velocity, integral
-        if z <= 0.0:
+        grounded = z <= 0.0
+        if grounded:
             a = b = 0.0
-        if kind == FLY:
-            ex, ey = wanted_x - x, wanted_y - y
-            if z > 0.0:
-                a, b = bound(a + ex * dt, INTEGRAL_LIMIT), bound(b + ey * dt, INTEGRAL_LIMIT)
-            along_x = bound(STIFFNESS * ex - DAMPING * u + INTEGRAL_GAIN * a, ACCELERATION_LIMIT)
-            along_y = bound(STIFFNESS * ey - DAMPING * v + INTEGRAL_GAIN * b, ACCELERATION_LIMIT)
+        if flying:
+            dx, dy = wanted_x - x, wanted_y - y
+            if not grounded:
+                a, b = a + dx * dt, b + dy * dt
+                if abs(a) > INTEGRAL_LIMIT:
+                    a = math.copysign(INTEGRAL_LIMIT, a)
+                if abs(b) > INTEGRAL_LIMIT:
+                    b = math.copysign(INTEGRAL_LIMIT, b)
+            along_x = STIFFNESS * dx - DAMPING * u + INTEGRAL_GAIN * a
+            along_y = STIFFNESS * dy - DAMPING * v + INTEGRAL_GAIN * b
+            if abs(along_x) > ACCELERATION_LIMIT:
+                along_x = math.copysign(ACCELERATION_LIMIT, along_x)
+            if abs(along_y) > ACCELERATION_LIMIT:
+                along_y = math.copysign(ACCELERATION_LIMIT, along_y)
         else:
             along_x, along_y = -DRAG * u, -DRAG * v
-        integral = (a, b, c)
         if wait <= ROUNDING:
-            integral, error, output = control(position, integral, error, output, kind, setpoint, VERTICAL)
-            steady = thrust_of(output[2])
+            pwm = open_loop(kind, pwm, grounded=grounded)
+            c, ez, pwm = control(Z, wanted_z - z, c, ez, pwm, flying=flying, grounded=grounded)
+            steady = thrust_of(pwm)
             wait += PERIOD
         wait -= dt
         later = steady + (thrust - steady) * lag
-        position, velocity = move(position, velocity, along_x, along_y, 0.5 * (thrust + later), dt)
+        x, y, z, u, v, w = move(x, y, z, u, v, w, along_x, along_y, 0.5 * (thrust + later), dt)
         thrust = later
-    return Body(position, velocity, integral, error, output, tilt, tilt_rate, thrust, wait)
+    error, output = (ex, ey, ez), (body.output[X], body.output[Y], pwm)
+    return Body((x, y, z), (u, v, w), (a, b, c), error, output, body.tilt, body.tilt_rate, thrust, wait)
