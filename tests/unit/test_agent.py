@@ -4,9 +4,9 @@ import threading
 from typing import Any
 
 import pytest
-from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.loop import PoseWatch, command, run
@@ -157,9 +157,9 @@ def test_references_that_catch_up_with_the_hand_do_not_wait_for_the_next_one() -
     hear(brain, T0, hand(1), state(2, 0), state(3, 0))
     brain.step(T0, FLYING, 0.0)
     now, used = T0 + 3 * MS, {HAND.key(): Heard(T0, 1, T0)}
-    hear(brain, now, evolve(state(2, 1), heard=used))
+    hear(brain, now, replace(state(2, 1), heard=used))
     assert brain.due(now).at_ns == T0 + 25 * MS, "drone 3 has not caught up"
-    hear(brain, now, evolve(state(3, 1), heard=used))
+    hear(brain, now, replace(state(3, 1), heard=used))
     assert brain.due(now).at_ns == T0 + 8_333_333
     brain.step(T0 + 9 * MS, FLYING, 0.0)
     hear(brain, T0 + 17 * MS, hand(2))
@@ -222,7 +222,7 @@ def test_whatever_valid_messages_say_the_state_is_valid_too(data: Any, airborne:
     now = T0
     for _ in range(3):
         sample = data.draw(MESSAGES[HandSample])
-        references = [evolve(data.draw(MESSAGES[DroneState]), id=drone) for drone in (2, 3)]
+        references = [replace(data.draw(MESSAGES[DroneState]), id=drone) for drone in (2, 3)]
         hear(brain, now, sample, *references)
         now += data.draw(st.integers(1, 2 * NS_PER_S))
         published = brain.step(now, FLYING if airborne else GROUNDED, data.draw(st.floats(0.0, 2.0)))
@@ -285,7 +285,7 @@ def test_each_mode_has_its_command(mode: Mode, order: str) -> None:
 
 
 def test_the_age_of_a_pose_counts_from_when_it_was_first_seen() -> None:
-    watch = PoseWatch(FakeVehicle([None, FLYING, FLYING, evolve(FLYING, seq=2)], threading.Event()))
+    watch = PoseWatch(FakeVehicle([None, FLYING, FLYING, replace(FLYING, seq=2)], threading.Event()))
     assert watch.read(T0) is None
     seen = [watch.read(T0 + tick * 100 * MS) for tick in range(1, 5)]
     assert [pair[1] for pair in seen if pair] == pytest.approx([0.0, 0.1, 0.0, 0.1])
