@@ -33,7 +33,7 @@ def main() -> int:
         bus = join(scenario, formation, drone_node(args.id), audited=True)
     except SwarmTouchError as error:
         return explain("agents", error)
-    inbox = Inbox(clock, wakes_for=agent.triggers)
+    inbox = Inbox(clock)
     with bus:
         for key in agent.senses.keys:
             bus.subscribe(key, inbox)

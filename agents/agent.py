@@ -8,7 +8,7 @@ from agents.control.single.avoidance import Encounter
 from agents.control.single.repair import REFERENCE_LOST, Reference
 from agents.control.single.steering import Bystander
 from agents.control.step import Inputs, Settings, State, start, step
-from agents.stepping import due_ns, step_rule
+from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
 from shared.formation import Formation
@@ -29,6 +29,7 @@ SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
 """... from this distance on, growing at this rate, up to this, m and m/s."""
 FORGOTTEN_AFTER = 5.0
 """After this long its body is no longer in the air, s."""
+_SILENT_NS = round(SILENT_AFTER * NS_PER_S)
 
 
 class Agent:
@@ -51,25 +52,22 @@ class Agent:
         self._epoch = epoch
         self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
         self._kin = {kin.drone: DRONE_STATE.key(id=kin.drone) for kin in settings.kin}
+        self._links = [link.name for link in settings.row.links]
         self._settings = settings
         self._rule = step_rule(scenario.rates)
         self._nominal_dt = 1.0 / scenario.rates.control_hz
         self._state: State | None = None
-        self._used: dict[str, Heard] = {}
+        self._used: dict[str, Sensed[HandSample] | Sensed[DroneState]] = {}
         self._last_step_ns = 0
-
-    @property
-    def triggers(self) -> frozenset[str]:
-        """Returns the keys that a step may wait for; whom it only avoids never triggers one."""
-        return frozenset([HAND_KEY, *self._references.values()])
 
     def receive(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Takes in what the bus delivered."""
         self.senses.take(arrivals)
 
-    def due_ns(self, now_ns: int) -> int:
+    def due(self, now_ns: int) -> Due:
         """Returns when the next step is due, given what has been heard so far."""
-        return due_ns(self._rule, self._last_step_ns, inputs_complete=self._inputs_complete(now_ns))
+        awaited = self._awaited(now_ns)
+        return Due(due_ns(self._rule, self._last_step_ns, inputs_complete=not awaited), awaited)
 
     def step(self, now_ns: int, pose: Pose, pose_age: float) -> DroneState:
         """Computes one step.
@@ -87,8 +85,8 @@ class Agent:
         dt = (now_ns - self._last_step_ns) / NS_PER_S if self.steps else self._nominal_dt
         inputs = self._inputs(now_ns, pose, pose_age)
         self._state, output = step(self._state, inputs, self._settings, dt)
-        self._used = self._heard()
         self._last_step_ns = now_ns
+        links = self._state.links
         state = DroneState(
             epoch=self._epoch,
             seq=self.steps,
@@ -100,44 +98,43 @@ class Agent:
             goal_velocity=output.goal_velocity,
             setpoint=output.setpoint,
             mode=self._state.mode.mode,
-            displacements={
-                link.name: moved.displacement
-                for link, moved in zip(self._settings.row.links, self._state.links, strict=True)
-            },
+            displacements={name: links[i].displacement for i, name in enumerate(self._links)},
             pose_age=pose_age,
             battery=pose.battery,
             flags=output.flags,
-            heard=self._used,
+            heard=self._note_used(self._state),
             step_ns=now_ns,
         )
         self.steps += 1
         return state
 
-    def _inputs_complete(self, now_ns: int) -> bool:
-        """Says whether the hand and every reference that is alive are newer than at the last step.
+    def _awaited(self, now_ns: int) -> list[str]:
+        """Returns the inputs that are alive but not newer than at the last step; none: a step may be made.
 
-        References that have caught up with the hand of the last step do not wait for the next hand: a step
-        that was too early for them would otherwise leave every later one a whole period behind.
+        Whom it only avoids is never waited for. The hand is, but last: everybody hears it at once, and a drone
+        has nothing to do before its references have stepped. References that have caught up with the hand of
+        the last step do not wait for the next hand: a step that was too early for them would otherwise leave
+        every later one a whole period behind.
         """
         live = [
             (key, sensed)
             for other, key in self._references.items()
             if (sensed := self.senses.drones.get(other)) and sensed.age(now_ns) <= REFERENCE_LOST
         ]
-        fresh = [self._is_fresh(key, sensed) for key, sensed in live]
+        if old := [key for key, sensed in live if not self._is_fresh(key, sensed)]:
+            return old
         hand = self.senses.hand
-        if hand is not None and hand.age(now_ns) <= HAND_STALE:
-            caught_up = bool(live) and all(_has_used(sensed.message, hand.message) for _, sensed in live)
-            fresh.append(caught_up or self._is_fresh(HAND_KEY, hand))
-        return bool(fresh) and all(fresh)
+        if hand is None or hand.age(now_ns) > HAND_STALE:
+            return [] if live else [HAND_KEY]
+        caught_up = bool(live) and all(_has_used(sensed.message, hand.message) for _, sensed in live)
+        return [] if caught_up or self._is_fresh(HAND_KEY, hand) else [HAND_KEY]
 
     def _is_fresh(self, key: str, sensed: Sensed[HandSample] | Sensed[DroneState]) -> bool:
-        used = self._used.get(key)
-        return used is None or (used.epoch, used.seq) != (sensed.message.epoch, sensed.message.seq)
+        return self._used.get(key) is not sensed
 
     def _inputs(self, now_ns: int, pose: Pose, pose_age: float) -> Inputs:
-        hand = self.senses.hand
-        drones, silent = _around(self.senses.drones.values(), now_ns)
+        hand, heard = self.senses.hand, self.senses.drones
+        drones, silent = _around(heard.values(), now_ns)
         return Inputs(
             position=pose.position,
             velocity=pose.velocity,
@@ -147,13 +144,12 @@ class Agent:
             wish=None if hand is None else hand.message.mode,
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
-            references=tuple([self._reference(other, key, now_ns) for other, key in self._kin.items()]),
+            references=tuple([self._reference(heard.get(kin), key, now_ns) for kin, key in self._kin.items()]),
             drones=drones,
             silent=silent,
         )
 
-    def _reference(self, other: int, key: str, now_ns: int) -> Reference | None:
-        sensed = self.senses.drones.get(other)
+    def _reference(self, sensed: Sensed[DroneState] | None, key: str, now_ns: int) -> Reference | None:
         if sensed is None:
             return None
         state, stable = sensed.message, self._settings.stable
@@ -166,14 +162,15 @@ class Agent:
             fresh=self._is_fresh(key, sensed),
         )
 
-    def _heard(self) -> dict[str, Heard]:
-        """Returns what this step used: the hand, the references, and who stands behind one that is gone."""
-        heard = {} if self.senses.hand is None else {HAND_KEY: self.senses.hand.heard}
-        repaired = self._state is not None and any(each.share for each in self._state.stand_ins)
-        for other, key in (self._kin if repaired else self._references).items():
-            if other in self.senses.drones:
-                heard[key] = self.senses.drones[other].heard
-        return heard
+    def _note_used(self, state: State) -> dict[str, Heard]:
+        """Notes, and returns, what this step used: hand, references, and who stands behind one that is gone."""
+        hand, drones = self.senses.hand, self.senses.drones
+        used: dict[str, Sensed[HandSample] | Sensed[DroneState]] = {} if hand is None else {HAND_KEY: hand}
+        for other, key in (self._kin if state.stand_ins else self._references).items():
+            if other in drones:
+                used[key] = drones[other]
+        self._used = used
+        return {key: sensed.heard for key, sensed in used.items()}
 
 
 def _has_used(state: DroneState, hand: HandSample) -> bool:
@@ -200,12 +197,14 @@ def _around(drones: Iterable[Sensed[DroneState]], now_ns: int) -> tuple[list[Enc
     """
     encounters, silent = [], []
     for sensed in drones:
+        (x, y, _), (u, v, _) = sensed.message.position, sensed.message.velocity
+        if now_ns - sensed.arrival_ns <= _SILENT_NS:
+            encounters.append((x, y, u, v))
+            continue
         age = sensed.age(now_ns)
         if age > FORGOTTEN_AFTER:
             continue
-        (x, y, _), (u, v, _) = sensed.message.position, sensed.message.velocity
         encounters.append((x, y, u, v) if age <= DRONE_STATE.stale_s else (x, y, 0.0, 0.0))
-        if age > SILENT_AFTER:
-            radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
-            silent.append(Bystander(x, y, radius))
+        radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
+        silent.append(Bystander(x, y, radius))
     return encounters, silent

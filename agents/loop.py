@@ -1,10 +1,14 @@
-"""The process around an agent: receive -> compute -> publish, until told to stop."""
+"""The process around an agent: receive -> compute -> publish, until told to stop.
+
+A turn is made by the thread that brings the last input of a step, see `agents.turns`.
+"""
 
 import logging
 import threading
 
 from agents.agent import Agent
 from agents.control.modes import POSE_LOST
+from agents.turns import Turns
 from agents.vehicles.base import Pose, Vehicle
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
@@ -15,8 +19,8 @@ from shared.transport import Inbox, Publish
 LONGEST_WAIT = 0.05
 """The loop looks at the stop event and the clock at least this often, s."""
 
-POSE_WAIT = 0.01
-"""A vehicle that has not reported yet is asked again after this long, s."""
+POSE_WAIT_NS = NS_PER_S // 100
+"""A vehicle that has not reported yet is asked again after this long."""
 
 _log = logging.getLogger("agent")
 
@@ -39,6 +43,48 @@ class PoseWatch:
         return pose, (now_ns - self._seen_ns) / NS_PER_S
 
 
+class Pilot:
+    """Makes the turns of an agent's loop: receive -> compute -> publish.
+
+    Args:
+        agent: Its brain.
+        vehicle: Its body.
+        inbox: Filled by the bus with everything in `agent.senses.keys`.
+        publish: Sends its state.
+        clock: The process's clock.
+    """
+
+    def __init__(self, agent: Agent, vehicle: Vehicle, inbox: Inbox, publish: Publish, clock: Clock) -> None:
+        self._agent, self._vehicle, self._inbox = agent, vehicle, inbox
+        self._publish, self._clock = publish, clock
+        self._poses = PoseWatch(vehicle)
+        self._mode: Mode | None = None
+
+    def turn(self) -> int:
+        """Takes in what has arrived and makes a step if one is due; returns when the next turn is due, ns."""
+        self._agent.receive(self._inbox.take())
+        now = self._clock()
+        due = self._agent.due(now)
+        if due.at_ns <= now and self._step(now):
+            due = self._agent.due(now)
+        self._inbox.expect(due.awaits)
+        return due.at_ns if due.at_ns > now else now + POSE_WAIT_NS
+
+    def _step(self, now_ns: int) -> bool:
+        """Steps, publishes and commands; returns whether it could: the vehicle must have reported once."""
+        seen = self._poses.read(now_ns)
+        if seen is None:
+            return False
+        state = self._agent.step(now_ns, *seen)
+        # The neighbours first: they wait for it, while the vehicle still has its last command.
+        self._publish(encode(state, self._clock()))
+        command(self._vehicle, state)
+        if state.mode is not self._mode:
+            _log.info("%s at height %.2f m (%s)", state.mode, state.position[2], state.flags.name or "no flags")
+            self._mode = state.mode
+        return True
+
+
 def run(
     agent: Agent,
     vehicle: Vehicle,
@@ -59,26 +105,13 @@ def run(
         clock: The process's clock.
         stopping: Ends the loop.
     """
-    poses = PoseWatch(vehicle)
-    mode: Mode | None = None
+    turns = Turns(Pilot(agent, vehicle, inbox, publish, clock).turn, clock)
+    inbox.answer = turns.take_aside
     while not stopping.is_set():
-        agent.receive(inbox.take())
+        turns.take()
         status.tick(agent.steps, "running" if agent.steps else "starting", agent.senses.rejected)
-        now = clock()
-        wait = (agent.due_ns(now) - now) / NS_PER_S
-        if wait > 0:
-            inbox.wait(min(wait, LONGEST_WAIT))
-            continue
-        seen = poses.read(now)
-        if seen is None:
-            inbox.wait(POSE_WAIT)
-            continue
-        state = agent.step(now, *seen)
-        command(vehicle, state)
-        publish(encode(state, clock()))
-        if state.mode is not mode:
-            _log.info("%s at height %.2f m (%s)", state.mode, state.position[2], state.flags.name or "no flags")
-            mode = state.mode
+        turns.rest(LONGEST_WAIT)
+    turns.end()
     status.tick(agent.steps, "ending", agent.senses.rejected, force=True)
 
 

@@ -3,6 +3,9 @@
 Waiting for the next 60 Hz tick would cost 1-16 ms per hop.
 """
 
+from collections.abc import Collection
+from typing import NamedTuple
+
 from attrs import frozen
 
 from shared.clock import NS_PER_S
@@ -18,6 +21,13 @@ class StepRule:
 
     shortest: int
     longest: int
+
+
+class Due(NamedTuple):
+    """When the next step is due, ns; earlier once something has come on all of the keys that it awaits."""
+
+    at_ns: int
+    awaits: Collection[str]
 
 
 def step_rule(rates: Rates) -> StepRule:

@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from attrs import evolve
+from msgspec.structs import replace
 
 from human_relay.relay import RelayState, has_news, make_sample, order, repeat_ns
 from human_relay.sources.base import HandSource
@@ -54,7 +54,7 @@ def run(
         offered = source.poll(now)
         if ordered or has_news(state, offered) or now >= repeat_ns(state):
             state, sample = make_sample(state, offered, now, finished=source.finished)
-            publish(sign(encode(evolve(sample, signature=blank()))) if sign else encode(sample))
+            publish(sign(encode(replace(sample, signature=blank()))) if sign else encode(sample))
         report("running")
         wake_ns = min(source.next_ns(now), repeat_ns(state))
         ordered = wait((wake_ns - clock()) / NS_PER_S)

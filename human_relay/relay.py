@@ -5,9 +5,7 @@ source's, the operator's and the relay's own, with STOP > LAND > HOLD > whatever
 """
 
 import math
-
-import numpy as np
-from attrs import evolve, field, frozen
+from typing import NamedTuple
 
 from human_relay.sources.base import HandPose
 from human_relay.velocity import VelocityState, step
@@ -29,8 +27,7 @@ MAX_YAW = 1_000.0
 _STRENGTH = {Wish.FLY: 0, Wish.GROUND: 0, Wish.HOLD: 1, Wish.LAND: 2, Wish.STOP: 3}
 
 
-@frozen(kw_only=True)
-class RelayState:
+class RelayState(NamedTuple):
     """What the relay remembers.
 
     Attributes:
@@ -50,7 +47,7 @@ class RelayState:
     override: Wish | None = None
     pose: HandPose | None = None
     velocity: Vector = ORIGIN
-    estimator: VelocityState = field(factory=VelocityState)
+    estimator: VelocityState = VelocityState()
     fresh_ns: int = 0
     sent_ns: int = 0
     rejected: int = 0
@@ -68,8 +65,8 @@ def order(state: RelayState, wish: Wish) -> RelayState:
     if state.override is Wish.STOP:
         return state
     if wish is Wish.FLY:
-        return evolve(state, override=None)
-    return evolve(state, override=_strongest(wish, state.override))
+        return state._replace(override=None)
+    return state._replace(override=_strongest(wish, state.override))
 
 
 def has_news(state: RelayState, offered: HandPose | None) -> bool:
@@ -104,7 +101,7 @@ def make_sample(
         wish = offered.mode
     else:
         impossible = offered is not None
-        state = evolve(state, velocity=ORIGIN, estimator=VelocityState(), rejected=state.rejected + impossible)
+        state = state._replace(velocity=ORIGIN, estimator=VelocityState(), rejected=state.rejected + impossible)
         wish = Wish.HOLD
     wish = _strongest(wish, state.override, Wish.LAND if finished else None)
     pose = state.pose
@@ -119,18 +116,17 @@ def make_sample(
     )
     # A STOP is final wherever it came from.
     override = Wish.STOP if wish is Wish.STOP else state.override
-    return evolve(state, seq=state.seq + 1, sent_ns=now_ns, override=override), sample
+    return state._replace(seq=state.seq + 1, sent_ns=now_ns, override=override), sample
 
 
 def _take(state: RelayState, offered: HandPose, now_ns: int) -> RelayState:
     """Makes a possible pose the current one, or ages the current one if there is nothing new."""
     if not has_news(state, offered):
         is_stale = now_ns - offered.t_ns > STALE_NS
-        return evolve(state, velocity=ORIGIN) if is_stale else state
+        return state._replace(velocity=ORIGIN) if is_stale else state
     dt = (offered.t_ns - state.pose.t_ns) / NS_PER_S if state.pose else 0.0
-    estimator, velocity = step(state.estimator, np.array(offered.position), dt)
-    vx, vy, vz = velocity.tolist()
-    return evolve(state, pose=offered, velocity=(vx, vy, vz), estimator=estimator, fresh_ns=now_ns)
+    estimator, velocity = step(state.estimator, offered.position, dt)
+    return state._replace(pose=offered, velocity=velocity, estimator=estimator, fresh_ns=now_ns)
 
 
 def _is_possible(state: RelayState, offered: HandPose) -> bool:

@@ -17,17 +17,19 @@ and nearly the delay of the first difference at a third of its sensitivity to no
 and error of this row on the recordings again; the error depends on what is taken for the true velocity.
 """
 
-import numpy as np
-import numpy.typing as npt
-from attrs import field, frozen
+import math
+from typing import NamedTuple
 
-Vec = npt.NDArray[np.float64]
+from shared.messages import ORIGIN, Vector
 
 WINDOW = 9
 """Samples that are fitted."""
 
 MAX_GAP = 0.1
 """Time between two samples after which the old ones say nothing about the velocity now, s."""
+
+_STRAIGHT, _CURVED = 3, 5
+"""From so many samples on a line is fitted, and a parabola."""
 
 _LEAST_CURVATURE = 1e-9
 """Below this the samples are at two times only, as far as numbers can tell: no parabola goes through them."""
@@ -36,70 +38,77 @@ MAX_SPEED = 3.0
 """Speed above which a step between two samples is a jump of the tracker, not a hand, m/s."""
 
 
-@frozen(eq=False)
-class VelocityState:
-    """The samples of the current window, the newest last.
+class VelocityState(NamedTuple):
+    """The samples of the current window, the newest last; plain numbers, for numpy is slow on so few.
 
     Attributes:
-        times: (n,) times relative to the newest sample, s, 0 <= n <= `WINDOW`.
-        positions: (n, 3) m.
+        times: At most `WINDOW` times relative to the newest sample, s.
+        positions: As many positions, m.
     """
 
-    times: Vec = field(factory=lambda: np.empty(0))
-    positions: Vec = field(factory=lambda: np.empty((0, 3)))
+    times: tuple[float, ...] = ()
+    positions: tuple[Vector, ...] = ()
 
 
-def step(state: VelocityState, position: Vec, dt: float) -> tuple[VelocityState, Vec]:
+def step(state: VelocityState, position: Vector, dt: float) -> tuple[VelocityState, Vector]:
     """Takes one sample in.
 
     Args:
         state: What the previous step returned, or a fresh state.
-        position: (3,) m, any frame.
+        position: m, any frame.
         dt: Time since the previous sample, s; ignored for the first. A sample that is not later than the
             previous one changes nothing.
 
     Returns:
-        The new state and the velocity, (3,) m/s: finite, at most `MAX_SPEED`, and zero from a gap or a jump
-        until three samples after it (the window starts anew there, so that neither causes a spike).
+        The new state and the velocity, m/s: finite, at most `MAX_SPEED`, and zero from a gap or a jump until
+        three samples after it (the window starts anew there, so that neither causes a spike).
     """
-    if not state.times.size:
+    if not state.times:
         return _restart(position)
     if not dt > 0.0:
         return state, _slope(state)
-    distance = float(np.linalg.norm(position - state.positions[-1]))
-    if dt > MAX_GAP or not distance <= MAX_SPEED * dt:
+    if dt > MAX_GAP or not math.dist(position, state.positions[-1]) <= MAX_SPEED * dt:
         return _restart(position)
-    times = np.append(state.times - dt, 0.0)[-WINDOW:]
-    positions = np.vstack((state.positions, position))[-WINDOW:]
-    state = VelocityState(times, positions)
+    times = (*[t - dt for t in state.times[1 - WINDOW :]], 0.0)
+    state = VelocityState(times, (*state.positions[1 - WINDOW :], position))
     return state, _slope(state)
 
 
-def _restart(position: Vec) -> tuple[VelocityState, Vec]:
-    return VelocityState(np.zeros(1), position[np.newaxis].copy()), np.zeros(3)
+def _restart(position: Vector) -> tuple[VelocityState, Vector]:
+    return VelocityState((0.0,), (position,)), ORIGIN
 
 
-def _slope(state: VelocityState) -> Vec:
-    """Fits a polynomial to the window and returns its derivative at the newest sample, (3,) m/s.
+def _slope(state: VelocityState) -> Vector:
+    """Fits a polynomial to the window and returns its derivative at the newest sample, m/s."""
+    if len(state.times) < _STRAIGHT:
+        return ORIGIN
+    x = y = z = 0.0
+    x0, y0, z0 = state.positions[-1]
+    for weight, (px, py, pz) in zip(_weights(state.times), state.positions, strict=True):
+        x, y, z = x + weight * (px - x0), y + weight * (py - y0), z + weight * (pz - z0)
+    speed = math.hypot(x, y, z)
+    share = MAX_SPEED / speed if speed > MAX_SPEED else 1.0
+    return (share * x, share * y, share * z)
 
-    The degree grows with the window (0, 1 from three samples, 2 from five): a young window is not noisier
-    than a difference of two samples.
+
+def _weights(times: tuple[float, ...]) -> list[float]:
+    """Returns what each sample counts in the derivative at the newest, 1/s.
+
+    The degree grows with the window: a young window is not noisier than a difference of two samples. The
+    polynomials 1, u, q are orthogonal over the window's times in spans: well conditioned at any sampling rate.
     """
-    degree = min(2, (state.times.size - 1) // 2)
-    if degree == 0:
-        return np.zeros(3)
-    # Polynomials 1, u, q orthogonal over the window's times, in spans: well conditioned at any sampling rate,
-    # and many times faster than a general least-squares solution.
-    span = -state.times[0]
-    u = state.times / span
-    u -= u.sum() / u.size
-    spread = u @ u
-    bend = (u * u @ u) / spread
-    weights = u / spread
-    q = u * u - bend * u - spread / u.size
-    curvature = q @ q
-    if degree == 2 and curvature > _LEAST_CURVATURE:
-        weights += (2.0 * u[-1] - bend) / curvature * q
-    slope: Vec = weights @ (state.positions - state.positions[-1]) / span
-    speed = float(np.linalg.norm(slope))
-    return slope * (MAX_SPEED / speed) if speed > MAX_SPEED else slope
+    n, span = len(times), -times[0]
+    mean = sum(times) / n
+    u = [(t - mean) / span for t in times]
+    squares = [a * a for a in u]
+    spread = sum(squares)
+    weights = [a / (spread * span) for a in u]
+    if n < _CURVED:
+        return weights
+    bend = sum([a * b for a, b in zip(u, squares, strict=True)]) / spread
+    q = [b - bend * a - spread / n for a, b in zip(u, squares, strict=True)]
+    curvature = sum([a * a for a in q])
+    if curvature <= _LEAST_CURVATURE:
+        return weights
+    turn = (2.0 * u[-1] - bend) / (curvature * span)
+    return [weight + turn * a for weight, a in zip(weights, q, strict=True)]

@@ -4,6 +4,7 @@ Topology: peers with static links, no discovery: every node listens on its endpo
 is given (each pair is dialled once, by the node that comes later in `shared.nodes`); `shared.net` says how.
 """
 
+import ctypes
 import json
 import logging
 import os
@@ -13,8 +14,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-# Read once when the library loads: with a single rx worker, a peer that vanishes silently stalls the others.
-os.environ.setdefault("ZENOH_RUNTIME", "(rx: (worker_threads: 8))")
+# Read once when the library loads. With a single rx worker, a peer that vanishes silently stalls the others.
+# Links live where they were opened, in net or acc: unless rx is the same, each message wakes two threads.
+os.environ.setdefault(
+    "ZENOH_RUNTIME",
+    "(rx: (worker_threads: 8), net: (handover: rx), acc: (handover: rx), tx: (worker_threads: 2))",
+)
 
 import zenoh
 
@@ -39,6 +44,7 @@ CLOSE_TIMEOUT_S = 1.0
 
 _OTHERS = zenoh.Locality.REMOTE
 _ALIVE_PREFIX = ALIVE.split("{", maxsplit=1)[0]
+_known = threading.local()
 _log = logging.getLogger("bus")
 _QOS: dict[Delivery, dict[str, Any]] = {
     Delivery.STATE: {
@@ -106,9 +112,11 @@ class ZenohBus:
 
     def subscribe(self, key_expression: str, inbox: Inbox) -> None:
         """See `Bus.subscribe`; the callback only stores bytes, decoding is the loop's work."""
+        fixed = None if "*" in key_expression else key_expression
 
         def store(sample: zenoh.Sample) -> None:
-            inbox.put(str(sample.key_expr), sample.payload.to_bytes())
+            _stay_known()
+            inbox.put(fixed or str(sample.key_expr), sample.payload.to_bytes())
 
         # On Zenoh's own thread: handing over to a Python thread per subscription would cost a wake-up each.
         handler = zenoh.handlers.Callback(store, indirect=False)
@@ -235,6 +243,16 @@ def _open(settings: Settings) -> zenoh.Session:
         raise DeviceError(
             f"cannot open the bus at {where}: {error}. Is the port in use? Set net.endpoints or net.base_port"
         ) from error
+
+
+def _stay_known() -> None:
+    """Keeps what Python knows of the calling thread of Zenoh's, which ends with the process.
+
+    Else Python would forget it after each callback and make it anew for the next: pages mapped and unmapped, on
+    every processor, per sample.
+    """
+    if not hasattr(_known, "state"):
+        _known.state = ctypes.pythonapi.PyGILState_Ensure()
 
 
 def _let_dead_links_go(session: zenoh.Session) -> "zenoh.LinkEventsListener[None]":

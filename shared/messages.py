@@ -9,8 +9,7 @@ import enum
 import sys
 from typing import Annotated, Any, NamedTuple
 
-from attrs import Factory, field, frozen
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 SCHEMA_VERSION = 1
 
@@ -93,17 +92,15 @@ class Heard(NamedTuple):
 NO_FLAGS = Flag(0)
 
 
-@frozen(kw_only=True)
-class Message:
-    """Envelope of every message."""
+class Message(Struct, frozen=True, kw_only=True, tag_field="v", tag=SCHEMA_VERSION):
+    """Envelope of every message; `v` is written, and checked, by `shared.codec`."""
 
     epoch: UInt64
     seq: UInt64
     stamp_ns: UInt64
 
 
-@frozen(kw_only=True)
-class HandSample(Message):
+class HandSample(Message, frozen=True, kw_only=True):
     """The hand and the operator's wish; the wish is state, repeated in every sample.
 
     Attributes:
@@ -121,8 +118,7 @@ class HandSample(Message):
     signature: bytes | None = None
 
 
-@frozen(kw_only=True)
-class DroneState(Message):
+class DroneState(Message, frozen=True, kw_only=True):
     """One control step of one drone.
 
     Attributes:
@@ -148,16 +144,15 @@ class DroneState(Message):
     goal_velocity: Velocity
     setpoint: Position
     mode: Mode
-    displacements: dict[str, Position] = Factory(dict)
+    displacements: dict[str, Position] = {}
     pose_age: Seconds = 0.0
     battery: Fraction = 1.0
     flags: Flag = NO_FLAGS
-    heard: dict[str, Heard] = Factory(dict)
+    heard: dict[str, Heard] = {}
     step_ns: UInt64 = 0
 
 
-@frozen(kw_only=True)
-class FormationState(Message):
+class FormationState(Message, frozen=True, kw_only=True):
     """State of the formation as the operator is to feel it (paper section 5.2).
 
     Attributes:
@@ -178,11 +173,10 @@ class FormationState(Message):
     trend: Annotated[int, Meta(ge=-1, le=1)]
     displacement: Coordinate
     missing: tuple[DroneId, ...] = ()
-    heard: dict[str, Heard] = Factory(dict)
+    heard: dict[str, Heard] = {}
 
 
-@frozen(kw_only=True)
-class PatternEvent(Message):
+class PatternEvent(Message, frozen=True, kw_only=True):
     """A tactile pattern: why, what, and how it went on the device.
 
     Attributes:
@@ -197,13 +191,12 @@ class PatternEvent(Message):
     pattern: str
     outcome: str
     state_seq: UInt64
-    heard: dict[str, Heard] = Factory(dict)
+    heard: dict[str, Heard] = {}
     started_ns: UInt64 = 0
     finished_ns: UInt64 = 0
 
 
-@frozen(kw_only=True)
-class ProcessStatus(Message):
+class ProcessStatus(Message, frozen=True, kw_only=True):
     """Health of one process, once a second and once more when it ends.
 
     Attributes:
@@ -227,5 +220,5 @@ class ProcessStatus(Message):
     rate_hz: Seconds = 0.0
     cpu: Seconds = 0.0
     rss_mb: Seconds = 0.0
-    rejected: dict[str, UInt64] = field(factory=dict)
-    metrics: dict[str, Finite] = field(factory=dict)
+    rejected: dict[str, UInt64] = {}
+    metrics: dict[str, Finite] = {}

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Generic, TypeVar
 
-from attrs import frozen
+from msgspec import Struct
 
 from shared.clock import NS_PER_S
 from shared.codec import decode
@@ -23,8 +23,7 @@ _LOG_PERIOD_NS = 5 * NS_PER_S
 _log = logging.getLogger("senses")
 
 
-@frozen
-class Sensed(Generic[M]):
+class Sensed(Struct, Generic[M], frozen=True):
     """One message and when it arrived (own clock, ns)."""
 
     message: M
@@ -75,32 +74,33 @@ class Senses:
                 except DecodeError as error:
                     self._reject(key, error, arrival_ns)
 
-    def hear_hand(self, sample: HandSample, arrival_ns: int) -> None:
+    def hear_hand(self, sensed: Sensed[HandSample]) -> None:
         """Takes a sample in.
 
         Raises:
             DecodeError: It is not newer than the last one.
         """
-        _check_newer(sample, self.hand, arrival_ns, HAND.stale_s)
-        self.hand = Sensed(sample, arrival_ns)
+        _check_newer(sensed, self.hand, HAND.stale_s)
+        self.hand = sensed
 
-    def hear_drone(self, state: DroneState, arrival_ns: int) -> None:
+    def hear_drone(self, sensed: Sensed[DroneState]) -> None:
         """Takes a state in.
 
         Raises:
             DecodeError: It is not newer than the last one of that drone.
         """
-        _check_newer(state, self.drones.get(state.id), arrival_ns, DRONE_STATE.stale_s)
-        self.drones[state.id] = Sensed(state, arrival_ns)
+        drone = sensed.message.id
+        _check_newer(sensed, self.drones.get(drone), DRONE_STATE.stale_s)
+        self.drones[drone] = sensed
 
     def _take_one(self, key: str, payload: bytes, arrival_ns: int) -> None:
         if key == _HAND_KEY:
-            sample = decode(payload, HandSample)
+            sample = Sensed(decode(payload, HandSample), arrival_ns)
             if self._verify:
                 # A signed sample that is older was recorded from the air: no silence makes it acceptable.
-                _check_newer(sample, self.hand, arrival_ns, NEVER)
+                _check_newer(sample, self.hand, NEVER)
                 self._verify(payload)
-            self.hear_hand(sample, arrival_ns)
+            self.hear_hand(sample)
             return
         drone = self._ids.get(key)
         if drone is None:
@@ -108,7 +108,7 @@ class Senses:
         state = decode(payload, DroneState)
         if state.id != drone:
             raise DecodeError("wrong-id", f"drone {state.id} on {key}")
-        self.hear_drone(state, arrival_ns)
+        self.hear_drone(Sensed(state, arrival_ns))
 
     def _reject(self, key: str, error: DecodeError, now_ns: int) -> None:
         self.rejected[error.reason] += 1
@@ -117,9 +117,7 @@ class Senses:
             _log.warning("dropped a sample on %s: %s (so far %s)", key, error, dict(self.rejected))
 
 
-def _check_newer(
-    message: Message, known: Sensed[HandSample] | Sensed[DroneState] | None, now_ns: int, stale_s: float
-) -> None:
+def _check_newer(sensed: Sensed[M], known: Sensed[M] | None, stale_s: float) -> None:
     """Refuses what is not newer by (epoch, seq).
 
     Raises:
@@ -128,9 +126,9 @@ def _check_newer(
     """
     if known is None:
         return
-    last = known.message
-    if (message.epoch, message.seq) > (last.epoch, last.seq):
+    message, last = sensed.message, known.message
+    if message.epoch == last.epoch and message.seq > last.seq:
         return
-    if message.epoch < last.epoch and known.age(now_ns) > stale_s:
+    if message.epoch > last.epoch or (message.epoch < last.epoch and known.age(sensed.arrival_ns) > stale_s):
         return
     raise DecodeError("out-of-order", f"({message.epoch}, {message.seq}) after ({last.epoch}, {last.seq})")

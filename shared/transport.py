@@ -6,7 +6,7 @@ Backends: `shared.bus` (Zenoh), `shared.radio` (multicast, from the relay to eve
 
 import contextlib
 import threading
-from collections.abc import Callable, Set
+from collections.abc import Callable, Collection
 from typing import NamedTuple, Protocol, Self
 
 from shared.clock import Clock
@@ -31,22 +31,25 @@ class Inbox:
     Args:
         clock: Stamps arrivals.
         depth: Samples kept per key; when full the oldest is dropped and counted in `dropped`.
-        wakes_for: Keys whose arrival ends a `wait`; None for all.
+
+    Attributes:
+        answer: Called on the thread that brings news; wakes the loop unless something else is put there.
     """
 
-    def __init__(self, clock: Clock, depth: int = PENDING_PER_KEY, wakes_for: Set[str] | None = None) -> None:
+    def __init__(self, clock: Clock, depth: int = PENDING_PER_KEY) -> None:
         self._clock = clock
         self._depth = depth
-        self._wakes_for = wakes_for
+        self._missing: set[str] | None = None
         self._pending: dict[str, list[Arrival]] = {}
         self._lock = threading.Lock()
         # Locked: nothing is there. An Event does the same, but costs several times as much.
         self._empty = threading.Lock()
         self._empty.acquire()
+        self.answer: Callable[[], None] = self.wake
         self.dropped = 0
 
     def put(self, key: str, payload: bytes) -> None:
-        """Stores one payload under its key and wakes the loop; called by the bus."""
+        """Stores one payload under its key; called by the bus. It is news unless something else is expected."""
         arrival = Arrival(payload, self._clock())
         with self._lock:
             queue = self._pending.setdefault(key, [])
@@ -54,8 +57,20 @@ class Inbox:
                 del queue[0]
                 self.dropped += 1
             queue.append(arrival)
-        if self._wakes_for is None or key in self._wakes_for:
-            self.wake()
+            news = self._missing is None
+            if self._missing and key in self._missing:
+                self._missing.remove(key)
+                news = not self._missing
+        if news:
+            self.answer()
+
+    def expect(self, keys: Collection[str]) -> None:
+        """From now on it is news once something has come on all of these keys, and never if there are none."""
+        with self._lock:
+            self._missing = {key for key in keys if key not in self._pending}
+            news = bool(keys) and not self._missing
+        if news:
+            self.answer()
 
     def take(self) -> dict[str, list[Arrival]]:
         """Returns what has arrived since the last call, per key, oldest first, and empties the inbox."""

@@ -5,11 +5,11 @@ clock: agents that use the same samples map them to the same point, whenever the
 """
 
 import math
-from typing import NamedTuple
 
 from attrs import frozen
+from msgspec import Struct
 
-from agents.control.single.vectors import ORIGIN, Vector, clamp, norm
+from agents.control.single.vectors import ORIGIN, Vector, clamp, shorten
 from shared.scenario import Hand
 
 MAX_SAMPLE_GAP = 0.1
@@ -19,7 +19,7 @@ OUTERMOST_SPEED = 1.0
 """Yaw turns the formation so that its outermost drone stays below this, m/s."""
 
 
-class HandInput(NamedTuple):
+class HandInput(Struct, frozen=True):
     """One hand sample in the world frame.
 
     Attributes:
@@ -35,7 +35,7 @@ class HandInput(NamedTuple):
     stamp: float
 
 
-class MappedHand(NamedTuple):
+class MappedHand(Struct, frozen=True):
     """The mapped hand.
 
     Attributes:
@@ -84,16 +84,19 @@ def map_hand(previous: MappedHand | None, sample: HandInput, settings: HandSetti
     target, velocity = _target(sample, settings)
     yaw = sample.yaw if settings.hand.follow_yaw else 0.0
     if previous is None:
-        return MappedHand(target, _capped(velocity, settings.hand.max_speed), yaw, 0.0, sample.stamp)
-    dt = min(max(sample.stamp - previous.stamp, 0.0), MAX_SAMPLE_GAP)
+        return MappedHand(target, shorten(velocity, settings.hand.max_speed), yaw, 0.0, sample.stamp)
+    gap = sample.stamp - previous.stamp
+    dt = 0.0 if gap < 0.0 else MAX_SAMPLE_GAP if gap > MAX_SAMPLE_GAP else gap
     point, velocity = _chase(previous.point, target, velocity, settings.hand.max_speed, dt)
-    turned, yaw_rate = _turn(previous.yaw, yaw, OUTERMOST_SPEED / max(settings.radius, 0.1), dt)
-    return MappedHand(point, velocity, turned, yaw_rate, sample.stamp)
+    yaw_rate = 0.0
+    if yaw != previous.yaw:
+        yaw, yaw_rate = _turn(previous.yaw, yaw, OUTERMOST_SPEED / max(settings.radius, 0.1), dt)
+    return MappedHand(point, velocity, yaw, yaw_rate, sample.stamp)
 
 
 def freeze(mapped: MappedHand) -> MappedHand:
     """Returns the mapped hand at rest where it is (HOLD, or the hand is silent)."""
-    return mapped._replace(velocity=ORIGIN, yaw_rate=0.0)
+    return MappedHand(mapped.point, ORIGIN, mapped.yaw, 0.0, mapped.stamp)
 
 
 def _target(sample: HandInput, settings: HandSettings) -> tuple[Vector, Vector]:
@@ -115,21 +118,12 @@ def _chase(
 ) -> tuple[Vector, Vector]:
     """Moves towards the target by at most `max_speed * dt`; arriving, it takes over the hand's velocity."""
     (x, y, z), (a, b, c) = point, target
-    way = (a - x, b - y, c - z)
-    distance = norm(way)
+    du, dv, dw = a - x, b - y, c - z
+    distance = math.hypot(du, dv, dw)
     if distance > max_speed * dt:
-        u, v, w = (component / distance for component in way)
-        heading = (u * max_speed, v * max_speed, w * max_speed)
-        return (x + u * max_speed * dt, y + v * max_speed * dt, z + w * max_speed * dt), heading
-    return target, _capped(velocity, max_speed)
-
-
-def _capped(velocity: Vector, max_speed: float) -> Vector:
-    speed = norm(velocity)
-    if speed <= max_speed:
-        return velocity
-    share = max_speed / speed
-    return (velocity[0] * share, velocity[1] * share, velocity[2] * share)
+        u, v, w = du / distance * max_speed, dv / distance * max_speed, dw / distance * max_speed
+        return (x + u * dt, y + v * dt, z + w * dt), (u, v, w)
+    return target, shorten(velocity, max_speed)
 
 
 def _turn(yaw: float, target: float, max_rate: float, dt: float) -> tuple[float, float]:

@@ -4,7 +4,8 @@ A pure function of what this drone knows; there is no coordinator (DESIGN sectio
 except STOP.
 """
 
-from attrs import evolve, frozen
+from msgspec import Struct
+from msgspec.structs import replace
 
 from shared.messages import Mode, Wish
 
@@ -27,14 +28,19 @@ CRITICAL_BATTERY = 0.1
 TOUCHDOWN = 0.06
 """Below this height a landing drone is on the ground, m."""
 
+# Python takes as long to find a member in its enumeration as for a dozen sums; every step asks for these.
+FOLLOW, STOP = Mode.FOLLOW, Mode.STOP
+_WISH_FLY, _WISH_HOLD, _WISH_STOP = Wish.FLY, Wish.HOLD, Wish.STOP
+
 AIRBORNE_MODES = frozenset({Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND})
 _FLYING_MODES = AIRBORNE_MODES - {Mode.LAND}
 GUIDED_MODES = frozenset({Mode.FOLLOW, Mode.HOLD})
 """Modes in which a drone is part of the formation and can be referred to."""
+_LANDING_WISHES = frozenset({Wish.LAND, Wish.GROUND})
+"""GROUND in flight means LAND."""
 
 
-@frozen(kw_only=True)
-class ModeInputs:
+class ModeInputs(Struct, frozen=True):
     """What decides about the mode.
 
     Attributes:
@@ -56,8 +62,7 @@ class ModeInputs:
     references_follow: bool
 
 
-@frozen(kw_only=True)
-class ModeState:
+class ModeState(Struct, frozen=True):
     """Mode, and whether the operator has to ask again before it may fly.
 
     Attributes:
@@ -76,35 +81,35 @@ def initial_mode(*, airborne: bool) -> ModeState:
 
 def next_mode(state: ModeState, inputs: ModeInputs) -> ModeState:
     """Returns the mode after one step."""
-    if state.mode is Mode.STOP or inputs.wish is Wish.STOP:
-        return evolve(state, mode=Mode.STOP)
-    if state.must_ask_again and inputs.hand_age <= HAND_STALE and inputs.wish is not Wish.FLY:
-        state = evolve(state, must_ask_again=False)
+    if state.mode is STOP or inputs.wish is _WISH_STOP:
+        return replace(state, mode=Mode.STOP)
+    if state.must_ask_again and inputs.hand_age <= HAND_STALE and inputs.wish is not _WISH_FLY:
+        state = replace(state, must_ask_again=False)
     empty = inputs.battery <= CRITICAL_BATTERY
-    if state.mode in _FLYING_MODES and (empty or inputs.pose_age > POSE_LOST):
-        return evolve(state, mode=Mode.LAND, must_ask_again=empty or state.must_ask_again)
+    if (empty or inputs.pose_age > POSE_LOST) and state.mode in _FLYING_MODES:
+        return replace(state, mode=Mode.LAND, must_ask_again=empty or state.must_ask_again)
     return _NEXT[state.mode](state, inputs)
 
 
 def _ground(state: ModeState, inputs: ModeInputs) -> ModeState:
     able = inputs.pose_age <= POSE_FRESH and inputs.battery > CRITICAL_BATTERY
     ready = able and _flown_by_hand(inputs) and not state.must_ask_again
-    return evolve(state, mode=Mode.TAKEOFF) if ready else state
+    return replace(state, mode=Mode.TAKEOFF) if ready else state
 
 
 def _takeoff(state: ModeState, inputs: ModeInputs) -> ModeState:
     if _landing_wished(inputs) or inputs.hand_age > HAND_LAND:
         return _land(state, inputs)
     if inputs.height >= inputs.takeoff_height - ARRIVED:
-        return evolve(state, mode=Mode.FOLLOW if _may_follow(inputs) else Mode.HOLD)
+        return replace(state, mode=Mode.FOLLOW if _may_follow(inputs) else Mode.HOLD)
     return state
 
 
 def _follow(state: ModeState, inputs: ModeInputs) -> ModeState:
     if _landing_wished(inputs) or inputs.hand_age > HAND_LAND:
         return _land(state, inputs)
-    held = inputs.wish is Wish.HOLD or inputs.hand_age > HAND_HOLD or not inputs.references_follow
-    return evolve(state, mode=Mode.HOLD) if held else state
+    held = inputs.wish is _WISH_HOLD or inputs.hand_age > HAND_HOLD or not inputs.references_follow
+    return replace(state, mode=Mode.HOLD) if held else state
 
 
 def _hold(state: ModeState, inputs: ModeInputs) -> ModeState:
@@ -112,25 +117,24 @@ def _hold(state: ModeState, inputs: ModeInputs) -> ModeState:
     silent = HAND_LAND < inputs.hand_age < float("inf")
     if _landing_wished(inputs) or silent:
         return _land(state, inputs)
-    return evolve(state, mode=Mode.FOLLOW) if _may_follow(inputs) else state
+    return replace(state, mode=Mode.FOLLOW) if _may_follow(inputs) else state
 
 
 def _landing(state: ModeState, inputs: ModeInputs) -> ModeState:
-    return evolve(state, mode=Mode.GROUND) if inputs.height <= TOUCHDOWN else state
+    return replace(state, mode=Mode.GROUND) if inputs.height <= TOUCHDOWN else state
 
 
 def _land(state: ModeState, inputs: ModeInputs) -> ModeState:
     wished = _landing_wished(inputs) and inputs.hand_age <= HAND_LAND
-    return evolve(state, mode=Mode.LAND, must_ask_again=not wished)
+    return replace(state, mode=Mode.LAND, must_ask_again=not wished)
 
 
 def _landing_wished(inputs: ModeInputs) -> bool:
-    """GROUND in flight means LAND."""
-    return inputs.wish in (Wish.LAND, Wish.GROUND)
+    return inputs.wish in _LANDING_WISHES
 
 
 def _flown_by_hand(inputs: ModeInputs) -> bool:
-    return inputs.wish is Wish.FLY and inputs.hand_age <= HAND_STALE
+    return inputs.wish is _WISH_FLY and inputs.hand_age <= HAND_STALE
 
 
 def _may_follow(inputs: ModeInputs) -> bool:

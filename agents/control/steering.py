@@ -27,6 +27,8 @@ HAND_SPEED_FACTOR = 1.5
 """The speed limit rises to this times the hand's speed."""
 ON_GOAL = 1e-6
 """The reference counts as on the goal within this distance, m."""
+SHORTEST_STEP = 1e-4
+"""A shorter step counts as this long, s."""
 LONGEST_STEP = 0.05
 """A longer pause between two steps does not let the reference move further, s."""
 
@@ -114,7 +116,7 @@ def steer(
         The reference and the set-points after the step, inside the fence and the limits.
     """
     limits = settings.limits
-    dt = min(max(dt, 1e-4), LONGEST_STEP)
+    dt = min(max(dt, SHORTEST_STEP), LONGEST_STEP)
     inside = np.minimum(np.maximum(goal, settings.low), settings.high)
     wanted, column_near = _towards(trajectory, inside, settings, dt)
     pushed = _keep_off(wanted, trajectory, around, settings)

@@ -2,27 +2,26 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from attrs import frozen
+from msgspec import Struct
 
 from agents.control import modes
 from agents.control.hand import HandInput, HandSettings, MappedHand, freeze, map_hand
 from agents.control.modes import ModeInputs, ModeState, next_mode
 from agents.control.single.avoidance import Encounter
-from agents.control.single.goals import Row, goal_of
+from agents.control.single.goals import Guide, Row, goal_of
 from agents.control.single.impedance import AT_REST, LinkState, step_links
 from agents.control.single.repair import (
-    Guide,
     Kin,
     Reference,
     StandIn,
     guide_of,
     guides,
-    nobody_gone,
+    is_gone,
     replace_lost,
 )
-from agents.control.single.steering import Bystander, SteeringSettings, Surroundings, steer
+from agents.control.single.steering import Bystander, Steered, SteeringSettings, Surroundings, steer
 from agents.control.single.trajectory import Trajectory, start_at
 from agents.control.single.vectors import ORIGIN, Vector, norm, rotate
 from agents.control.steering import LONGEST_STEP
@@ -32,6 +31,9 @@ BLOCKED_ERROR = 0.3
 """Goal error that counts as not arriving, m ..."""
 BLOCKED_TIME = 2.0
 """... after this long, s."""
+
+_JOINING_MODES = frozenset({Mode.GROUND, Mode.TAKEOFF})
+_REPAIRED_MODES = modes.GUIDED_MODES | {Mode.TAKEOFF}
 
 
 @frozen(kw_only=True)
@@ -61,7 +63,7 @@ class Settings:
     landing_speed: float
 
 
-class Inputs(NamedTuple):
+class Inputs(Struct, frozen=True):
     """What one step works on.
 
     Attributes:
@@ -91,7 +93,7 @@ class Inputs(NamedTuple):
     silent: Sequence[Bystander] = ()
 
 
-class State(NamedTuple):
+class State(Struct, frozen=True):
     """What one step hands to the next.
 
     Attributes:
@@ -101,7 +103,7 @@ class State(NamedTuple):
         trajectory: Reference of the set-point.
         anchor: Own goal while no reference is usable, m.
         blocked_for: How long the drone has not arrived, s.
-        stand_ins: How far each of the kin has been replaced.
+        stand_ins: How far each of the kin has been replaced; none while all speak for themselves.
     """
 
     mode: ModeState
@@ -113,7 +115,7 @@ class State(NamedTuple):
     stand_ins: tuple[StandIn, ...]
 
 
-class Output(NamedTuple):
+class Output(Struct, frozen=True):
     """Result of one step: vectors in the world frame, m and m/s, and the conditions."""
 
     goal: Vector
@@ -131,7 +133,7 @@ def start(position: Vector, settings: Settings, *, airborne: bool) -> State:
         trajectory=start_at(position),
         anchor=position,
         blocked_for=0.0,
-        stand_ins=nobody_gone(settings.kin),
+        stand_ins=(),
     )
 
 
@@ -147,56 +149,58 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
     Returns:
         The state after the step, and what to publish and to send to the vehicle.
     """
+    direct = len(settings.row.weights) - 1
     stand_ins = _stand_ins(state, inputs, settings, dt)
-    lead = _lead(stand_ins, state.hand, inputs, settings)
-    usable = lead is not None
-    mode = next_mode(state.mode, _mode_inputs(state, inputs, settings, lead))
-    hand = _hand(state, inputs, mode.mode, settings.hand)
+    lead = _lead(stand_ins, state.hand, inputs, settings, direct)
+    mode_state = next_mode(state.mode, _mode_inputs(state, inputs, settings, lead))
+    mode = mode_state.mode
+    hand = _hand(state, inputs, mode, settings.hand)
     velocity = ORIGIN if hand is None else rotate(hand.velocity, -hand.yaw)
     links = step_links(state.links, settings.row.links, velocity, dt)
 
-    if mode.mode in modes.GUIDED_MODES and lead is not None and hand is not None:
-        points, velocities = [guide.point for guide in lead], [guide.velocity for guide in lead]
-        goal, goal_velocity = goal_of(settings.row, links, hand, points, velocities, settings.reference_heights)
+    if mode in modes.GUIDED_MODES and lead is not None and hand is not None:
+        goal, goal_velocity = goal_of(settings.row, links, hand, lead, settings.reference_heights)
         anchor = state.trajectory.point
     else:
-        anchor = goal = _own_goal(state, mode.mode, inputs.position, settings, min(dt, LONGEST_STEP))
+        anchor = goal = _own_goal(state, mode, inputs.position, settings, min(dt, LONGEST_STEP))
         goal_velocity = ORIGIN
 
-    trajectory = state.trajectory if mode.mode in modes.AIRBORNE_MODES else start_at(inputs.position)
+    trajectory = state.trajectory if mode in modes.AIRBORNE_MODES else start_at(inputs.position)
     steered = steer(trajectory, goal, goal_velocity, _surroundings(inputs), settings.steering, dt)
-    late = mode.mode is Mode.FOLLOW and math.dist(goal, inputs.position) > BLOCKED_ERROR
+    late = mode is modes.FOLLOW and math.dist(goal, inputs.position) > BLOCKED_ERROR
     blocked_for = state.blocked_for + dt if late else 0.0
-    flags = _flags(inputs, settings, usable=usable, fenced=steered.fenced, avoiding=steered.avoiding)
+    flags = _flags(inputs, steered, inputs.references[:direct], stand_ins[:direct], usable=lead is not None)
     if blocked_for > BLOCKED_TIME:
         flags |= Flag.BLOCKED
-    if any(stand_in.share for stand_in in stand_ins[: len(settings.row.weights) - 1]):
-        flags |= Flag.REPAIRED
-    after = State(mode, hand, links, steered.trajectory, anchor, blocked_for, stand_ins)
+    after = State(mode_state, hand, links, steered.trajectory, anchor, blocked_for, stand_ins)
     return after, Output(goal, goal_velocity, steered.setpoint, flags)
 
 
 def _stand_ins(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[StandIn, ...]:
     """Replaces who is gone while there is a formation; on the ground everybody is expected to join."""
-    mode = state.mode.mode
-    if mode not in modes.GUIDED_MODES and mode is not Mode.TAKEOFF:
-        return nobody_gone(settings.kin)
+    if state.mode.mode not in _REPAIRED_MODES:
+        return ()
+    if not state.stand_ins and not any(map(is_gone, inputs.references)):
+        return ()
     velocity = ORIGIN if state.hand is None else rotate(state.hand.velocity, -state.hand.yaw)
     return replace_lost(state.stand_ins, settings.kin, inputs.references, velocity, dt)
 
 
 def _lead(
-    stand_ins: tuple[StandIn, ...], hand: MappedHand | None, inputs: Inputs, settings: Settings
+    stand_ins: tuple[StandIn, ...], hand: MappedHand | None, inputs: Inputs, settings: Settings, direct: int
 ) -> list[Guide] | None:
     """Returns whom to follow in the place of each reference; None if one of them has not joined yet."""
-    wanted = len(settings.row.weights) - 1
-    if hand is None:
-        # Without a hand there is no goal; all that counts is whether the references hold or follow.
-        found = [guide_of(reference) for reference in inputs.references[:wanted]]
+    if stand_ins and hand is not None:
+        found = guides(stand_ins, settings.kin, inputs.references, direct, hand)
     else:
-        found = guides(stand_ins, settings.kin, inputs.references, wanted, hand)
-    lead = [guide for guide in found if guide is not None]
-    return lead if len(lead) == wanted else None
+        # Without a hand there is no goal; all that counts is whether the references hold or follow.
+        found = [guide_of(reference) for reference in inputs.references[:direct]]
+    lead = []
+    for guide in found:
+        if guide is None:
+            return None
+        lead.append(guide)
+    return lead
 
 
 def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Guide] | None) -> ModeInputs:
@@ -208,7 +212,7 @@ def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Gu
         battery=inputs.battery,
         height=state.anchor[2] if lost else inputs.position[2],
         takeoff_height=settings.takeoff_height,
-        references_follow=lead is not None and all(guide.follows for guide in lead),
+        references_follow=lead is not None and all(guide.mode is modes.FOLLOW for guide in lead),
     )
 
 
@@ -218,13 +222,12 @@ def _hand(state: State, inputs: Inputs, mode: Mode, settings: HandSettings) -> M
     Only a hand that wants to FLY is adopted: what a relay sends while it holds need not be where a hand is.
     """
     mapped, sample = state.hand, inputs.hand
-    joining = mode in (Mode.GROUND, Mode.TAKEOFF)
-    if sample is not None and inputs.wish is Wish.FLY and (joining or mapped is None):
+    if (mapped is None or mode in _JOINING_MODES) and sample is not None and inputs.wish is Wish.FLY:
         adopted = map_hand(None, sample, settings)
-        return adopted if mode is Mode.FOLLOW else freeze(adopted)
+        return adopted if mode is modes.FOLLOW else freeze(adopted)
     if mapped is None:
         return None
-    if sample is None or mode is not Mode.FOLLOW or inputs.hand_age > modes.HAND_STALE:
+    if sample is None or mode is not modes.FOLLOW or inputs.hand_age > modes.HAND_STALE:
         return freeze(mapped)
     return map_hand(mapped, sample, settings) if inputs.hand_fresh else mapped
 
@@ -253,10 +256,20 @@ def _surroundings(inputs: Inputs) -> Surroundings:
     )
 
 
-def _flags(inputs: Inputs, settings: Settings, *, usable: bool, fenced: bool, avoiding: bool) -> Flag:
+def _flags(
+    inputs: Inputs,
+    steered: Steered,
+    references: Sequence[Reference | None],
+    stand_ins: Sequence[StandIn],
+    *,
+    usable: bool,
+) -> Flag:
     flags = NO_FLAGS
-    if any(r is not None and not r.fresh for r in inputs.references[: len(settings.row.weights) - 1]):
-        flags |= Flag.EXTRAPOLATING
+    for reference in references:
+        if reference is not None and not reference.fresh:
+            flags |= Flag.EXTRAPOLATING
+    if stand_ins and any(stand_in.share for stand_in in stand_ins):
+        flags |= Flag.REPAIRED
     if not usable:
         flags |= Flag.REFERENCE_LOST
     if inputs.hand_age > modes.HAND_STALE:
@@ -267,8 +280,8 @@ def _flags(inputs: Inputs, settings: Settings, *, usable: bool, fenced: bool, av
         flags |= Flag.LOW_BATTERY
     if inputs.battery <= modes.CRITICAL_BATTERY:
         flags |= Flag.CRITICAL_BATTERY
-    if fenced:
+    if steered.fenced:
         flags |= Flag.FENCE
-    if avoiding:
+    if steered.avoiding:
         flags |= Flag.AVOIDING
     return flags

@@ -2,13 +2,12 @@
 
 from typing import Protocol
 
-from attrs import frozen
+from msgspec import Struct
 
 from shared.messages import Vector
 
 
-@frozen
-class Pose:
+class Pose(Struct, frozen=True):
     """A vehicle's own report.
 
     Attributes:

@@ -158,6 +158,6 @@ def _hop_sheet(hops: dict[int, Json]) -> Sheet:
     )
     return Sheet(
         title="Of that, agents: medians from the last input of a step on, ms",
-        columns=("", "encoding and transport", "wake-up and decoding", "step and command"),
+        columns=("", "encoding and transport", "decoding and waiting", "pose and step"),
         rows=tuple(rows),
     )

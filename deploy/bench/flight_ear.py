@@ -23,8 +23,8 @@ class HopTimes:
 
     Attributes:
         transport: From the stamp of that input to its arrival: encoding, bus, the thread that delivers.
-        wake: From its arrival to the start of the step: waking up, decoding, and waiting where it must.
-        step: From the start of the step to its stamp: control law and command to the vehicle.
+        wake: From its arrival to the start of the step: decoding, and waiting where it must.
+        step: From the start of the step to its stamp: the vehicle's pose and the control law.
     """
 
     transport: list[float] = field(factory=list)

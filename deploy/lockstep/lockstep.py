@@ -12,20 +12,25 @@ import numpy as np
 
 from agents.agent import Agent
 from agents.settings import agent_settings, hand_settings
-from agents.vehicles.bodies.fleet import Fleet, advance_fleet, poses
-from agents.vehicles.bodies.state import Command, Commands
+from agents.vehicles.bodies.fleet import Fleet
+from agents.vehicles.bodies.single.fleet import advance_flyer, flyers, pose_of
+from agents.vehicles.bodies.state import Command
 from deploy.lockstep.hand_track import track_hand
 from deploy.lockstep.record import Moment, Record, make_record
 from deploy.lockstep.start import rest_places, start_fleet
-from deploy.lockstep.ticks import tick_length, tick_ns
+from deploy.lockstep.ticks import tick_ns
+from shared.clock import NS_PER_S
 from shared.codec import encode
 from shared.formation import Formation, Vec
 from shared.messages import DroneState, HandSample, Mode
 from shared.scenario import Scenario
+from shared.senses import Sensed
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
-_COMMANDS = {Mode.STOP: Command.CUT, Mode.GROUND: Command.IDLE}
+_HAND_KEY = HAND.key()
+_COMMANDS = dict.fromkeys(Mode, Command.FLY.value)
+_COMMANDS |= {Mode.STOP: Command.CUT.value, Mode.GROUND: Command.IDLE.value}
 
 
 class Lockstep:
@@ -34,21 +39,20 @@ class Lockstep:
     Args:
         scenario: The scenario.
         formation: Its formation.
-        fleet: Bodies, one per drone in the formation's order.
+        fleet: Bodies at the start, one per drone in the formation's order.
         encoded: Whether agents hear bytes, as in flight; it takes longer.
 
     Attributes:
-        fleet: The bodies now.
+        flyers: The bodies now, in the formation's order.
         tick: Number of the next tick.
         payloads: If encoded: what was published in the last tick, by key: the hand's sample and every state.
     """
 
     def __init__(self, scenario: Scenario, formation: Formation, fleet: Fleet, *, encoded: bool = True) -> None:
-        self.fleet = fleet
+        self.flyers = flyers(fleet)
         self.tick = 0
         self.payloads: dict[str, bytes] = {}
         self._encoded = encoded
-        self._charge = [1.0] * len(formation.ids)
         self._rate = scenario.rates.control_hz
         self._order = [row for level in formation.levels for row in level]
         self._agents = [
@@ -57,8 +61,8 @@ class Lockstep:
         ]
         self._keys = [DRONE_STATE.key(id=drone) for drone in formation.ids]
         self._listeners = {
-            key: [agent for agent in self._agents if key in agent.senses.keys]
-            for key in (HAND.key(), *self._keys)
+            key: [agent.senses for agent in self._agents if key in agent.senses.keys]
+            for key in (_HAND_KEY, *self._keys)
         }
 
     def advance(self, sample: HandSample) -> list[DroneState]:
@@ -71,30 +75,33 @@ class Lockstep:
             What each drone published, in the formation's order.
         """
         now = tick_ns(self.tick, self._rate)
-        self._publish(HAND.key(), sample, now)
-        reports = poses(self.fleet, self._charge, self.tick)
+        self._publish(_HAND_KEY, sample, now)
         states: dict[int, DroneState] = {}
         for row in self._order:
-            states[row] = self._agents[row].step(now, reports[row], 0.0)
+            states[row] = self._agents[row].step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
             self._publish(self._keys[row], states[row], now)
         ordered = [states[row] for row in range(len(states))]
-        kind = np.array([_COMMANDS.get(state.mode, Command.FLY) for state in ordered], dtype=np.int8)
-        commands = Commands(kind, np.array([state.setpoint for state in ordered]))
-        self.fleet = advance_fleet(self.fleet, commands, tick_length(self.tick, self._rate))
+        duration = (tick_ns(self.tick + 1, self._rate) - now) / NS_PER_S
+        self.flyers = [
+            advance_flyer(self.flyers[row], _COMMANDS[state.mode], state.setpoint, duration)
+            for row, state in enumerate(ordered)
+        ]
         self.tick += 1
         return ordered
 
     def _publish(self, key: str, message: HandSample | DroneState, now_ns: int) -> None:
         if self._encoded:
             self.payloads[key] = payload = encode(message)
-            for agent in self._listeners[key]:
-                agent.receive({key: [Arrival(payload, now_ns)]})
+            for senses in self._listeners[key]:
+                senses.take({key: [Arrival(payload, now_ns)]})
         elif isinstance(message, HandSample):
-            for agent in self._listeners[key]:
-                agent.senses.hear_hand(message, now_ns)
+            sample = Sensed(message, now_ns)
+            for senses in self._listeners[key]:
+                senses.hear_hand(sample)
         else:
-            for agent in self._listeners[key]:
-                agent.senses.hear_drone(message, now_ns)
+            state = Sensed(message, now_ns)
+            for senses in self._listeners[key]:
+                senses.hear_drone(state)
 
 
 def fly_lockstep(

@@ -132,12 +132,13 @@ def _figure_eight(peak: float) -> Segment:
 
 
 def _poses(segments: list[Segment], lead: float, duration: float, start_ns: int) -> Iterator[HandPose]:
-    duration = duration or sum(segment.duration for segment in segments)
+    length = sum(segment.duration for segment in segments)
+    duration = duration or length
     for tick in itertools.count():
         seconds = tick / RATE_HZ - lead
         if seconds > duration:
             return
-        x, y = _at(segments, seconds)
+        x, y = _at(segments, max(0.0, seconds) % length)
         yield HandPose(
             position=(REST[0] + x, REST[1] + y, REST[2]),
             yaw=0.0,
@@ -146,9 +147,8 @@ def _poses(segments: list[Segment], lead: float, duration: float, start_ns: int)
         )
 
 
-def _at(segments: list[Segment], seconds: float) -> Point:
-    """Returns the displacement at a time since the end of the lead; the script repeats itself."""
-    t = max(0.0, seconds) % sum(segment.duration for segment in segments)
+def _at(segments: list[Segment], t: float) -> Point:
+    """Returns the displacement at a time since the script began, anew or for the first time, s."""
     for segment in segments:
         if t <= segment.duration:
             return segment.at(t)

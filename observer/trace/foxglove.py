@@ -5,14 +5,13 @@ import math
 from pathlib import Path
 from typing import IO, Any
 
-from attrs import AttrsInstance
 from cattrs import Converter
 from mcap.writer import Writer
 
 from observer.trace.foxglove_types import Pose, PoseInFrame, Quaternion, SceneUpdate, Time, Vector3
 from observer.trace.read import Record, Trace
 from observer.trace.scene import FRAME, Scene
-from observer.trace.schemas import json_fields, json_schema
+from observer.trace.schemas import Kind, json_fields, json_schema
 from shared.clock import NS_PER_S
 from shared.formation import build_formation
 from shared.messages import NO_HAND, DroneState, HandSample, Message
@@ -84,7 +83,7 @@ class _JsonWriter:
         """Finishes the file."""
         self._writer.finish()
 
-    def _write(self, topic: str, kind: type[AttrsInstance], fields: dict[str, Any], record: Record) -> None:
+    def _write(self, topic: str, kind: Kind, fields: dict[str, Any], record: Record) -> None:
         channel = self._channels.get(topic)
         if channel is None:
             channel = self._writer.register_channel(topic, "json", self._schema(kind))
@@ -97,7 +96,7 @@ class _JsonWriter:
             sequence=record.seq,
         )
 
-    def _schema(self, kind: type[AttrsInstance]) -> int:
+    def _schema(self, kind: Kind) -> int:
         if kind not in self._schemas:
             family = "swarmtouch" if issubclass(kind, Message) else "foxglove"
             schema = json.dumps(json_schema(kind)).encode()

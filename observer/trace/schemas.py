@@ -1,4 +1,4 @@
-"""JSON Schemas of attrs classes, derived from their declared types: a trace explains itself.
+"""JSON Schemas of messages and attrs classes, derived from their declared types: a trace explains itself.
 
 A schema describes the decoded MessagePack map, and the same message in JSON. Bytes are binary in MessagePack
 and base64 in JSON; JSON Schema has a word for the latter only.
@@ -11,12 +11,14 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import attrs
 import msgpack
-from msgspec import Meta
+from msgspec import Meta, structs
 
 from shared.codec import encode
 from shared.messages import SCHEMA_VERSION, Message
 
 Schema = dict[str, Any]
+Kind = type[Message] | type[attrs.AttrsInstance]
+"""What has a schema: a message, or any attrs class of numbers, words, vectors and such classes."""
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _FLAG_BITS = 32
@@ -30,11 +32,11 @@ _PLAIN: dict[Any, Schema] = {
 }
 
 
-def json_schema(kind: type[attrs.AttrsInstance]) -> Schema:
+def json_schema(kind: Kind) -> Schema:
     """Describes a class.
 
     Args:
-        kind: A message, or any attrs class of numbers, words, vectors and such classes.
+        kind: Its type.
 
     Returns:
         A JSON Schema (2020-12); more fields than it names are allowed, as in `shared.codec`.
@@ -56,13 +58,16 @@ def _base64(value: bytes) -> str:
     return base64.b64encode(value).decode()
 
 
-def _object(kind: type[attrs.AttrsInstance]) -> Schema:
+def _object(kind: Kind) -> Schema:
     hints = get_type_hints(kind, include_extras=True)
-    fields = attrs.fields(kind)
+    if issubclass(kind, Message):
+        required = {field.name: field.required for field in structs.fields(kind)}
+    else:
+        required = {field.name: field.default is attrs.NOTHING for field in attrs.fields(kind)}
     return {
         "type": "object",
-        "properties": {field.name: _schema(hints[field.name]) for field in fields},
-        "required": [field.name for field in fields if field.default is attrs.NOTHING],
+        "properties": {name: _schema(hints[name]) for name in required},
+        "required": [name for name, needed in required.items() if needed],
     }
 
 

@@ -6,8 +6,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import attrs
-
 from observer.trace.read import Trace
 from shared.clock import NS_PER_S
 from shared.messages import Heard, Message
@@ -63,8 +61,8 @@ def export_csv(trace: Trace, folder: Path) -> list[Path]:
 def flatten(message: Message) -> Row:
     """Returns the fields of a message as cells of a table."""
     cells: Row = {}
-    for field in attrs.fields(type(message)):
-        _flatten(field.name, getattr(message, field.name), cells)
+    for name in message.__struct_fields__:
+        _flatten(name, getattr(message, name), cells)
     return cells
 
 

@@ -25,6 +25,9 @@ KEEP_ALIVES = 10
 STATES_QUEUED = 16
 """Samples that wait on a link while Zenoh's sending thread does not get the processor: a quarter of a second of
 them. With the default of two, a machine that is busy for three periods loses some, and `put` waits besides."""
+BATCH_BYTES = 8192
+"""Room for the largest message, the codec's 4 KiB, and its key. With Zenoh's 64 KiB so many samples are a
+megabyte of memory, which every link that stalls takes and gives back when it is gone."""
 MAX_PUT_BYTES = 16_384
 """Zenoh drops larger ones uncounted; what is over the codec's 4 KiB but under this is counted as oversized."""
 MAX_MESSAGE_BYTES = 65_536
@@ -137,6 +140,7 @@ def _node(mode: str, listen: Sequence[str], connect: Sequence[str]) -> Settings:
                 "tx": {
                     "lease": LEASE_MS,
                     "keep_alive": KEEP_ALIVES,
+                    "batch_size": BATCH_BYTES,
                     "queue": {"size": {"real_time": STATES_QUEUED}},
                 }
             },

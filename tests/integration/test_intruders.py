@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import attrs
 import pytest
 import zenoh
+from msgspec.structs import replace
 
 from deploy.net.authority import create, issue
 from deploy.status.listen import listen
@@ -123,7 +123,7 @@ def test_who_is_no_member_any_more_is_heard_by_nobody(unaffected: Swarm, keys: K
 
 
 def test_a_drone_cannot_speak_for_another(unaffected: Swarm, keys: Keyring) -> None:
-    lie = encode(attrs.evolve(unaffected.recorder.latest(3), position=(9.0, 9.0, 9.0), seq=2**60))
+    lie = encode(replace(unaffected.recorder.latest(3), position=(9.0, 9.0, 9.0), seq=2**60))
     key = f"rhombus/{DRONE_STATE.key(id=3)}"
     with session_of(client_of(door(unaffected), keys, "drone/2")) as put:
         pour(put, key, lie, count=50, rate_hz=100.0)
@@ -131,7 +131,7 @@ def test_a_drone_cannot_speak_for_another(unaffected: Swarm, keys: Keyring) -> N
 
 
 def test_a_drone_cannot_play_the_hand_however_fast_it_tries(unaffected: Swarm, keys: Keyring) -> None:
-    lie = encode(attrs.evolve(newest_hand(unaffected), position=(9.0, 9.0, 9.0), seq=2**60))
+    lie = encode(replace(newest_hand(unaffected), position=(9.0, 9.0, 9.0), seq=2**60))
     key = f"rhombus/{HAND.key()}"
     with session_of(client_of(door(unaffected), keys, "drone/2")) as put:
         pour(put, key, lie, count=FLOOD, rate_hz=FLOOD_HZ)
@@ -142,12 +142,12 @@ def test_with_the_stolen_key_of_the_relay_the_hand_is_still_signed(unaffected: S
     """Replayed, unsigned, forged and oversized samples pass the rules and are told apart by the agent."""
     hand = newest_hand(unaffected)
     before = dict(unaffected.recorder.statuses[VICTIM].rejected)
-    replayed = sign_with(keys.hand_private)(encode(attrs.evolve(hand, signature=blank())))
-    newer = attrs.evolve(hand, seq=2**60, position=(9.0, 9.0, 9.0))
+    replayed = sign_with(keys.hand_private)(encode(replace(hand, signature=blank())))
+    newer = replace(hand, seq=2**60, position=(9.0, 9.0, 9.0))
     samples = {
         "out-of-order": replayed,
-        "unsigned": encode(attrs.evolve(newer, signature=None)),
-        "bad-signature": encode(attrs.evolve(newer, signature=blank())),
+        "unsigned": encode(replace(newer, signature=None)),
+        "bad-signature": encode(replace(newer, signature=blank())),
         "oversized": encode(newer) + bytes(8000),
     }
     with session_of(client_of(door(unaffected), keys, "relay")) as put:

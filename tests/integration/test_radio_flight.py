@@ -4,8 +4,8 @@ import socket
 from collections.abc import Iterator
 from pathlib import Path
 
-import attrs
 import pytest
+from msgspec.structs import replace
 
 from deploy.net.authority import create, issue
 from deploy.status.listen import listen
@@ -87,15 +87,15 @@ def test_who_disturbs_the_radio_is_counted_by_reason_and_changes_nothing(
 ) -> None:
     start_ns = swarm.recorder.clock()
     hand = swarm.recorder.hands[max(swarm.recorder.hands)]
-    newer = attrs.evolve(hand, seq=2**60, position=(9.0, 9.0, 9.0), signature=blank())
+    newer = replace(hand, seq=2**60, position=(9.0, 9.0, 9.0), signature=blank())
     another = sign_with(other_hand(swarm))(encode(newer))
     say_hand, say_state = foreign.publisher(HAND), foreign.publisher(DRONE_STATE, id=2)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as garbage:
         garbage.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
         for _ in range(50):
             garbage.sendto(b"\xff" * 40, radio_group(swarm.scenario.net)[:2])
-            say_state(encode(attrs.evolve(swarm.recorder.latest(2), position=(9.0, 9.0, 9.0))))
-            say_hand(encode(attrs.evolve(newer, signature=None)))
+            say_state(encode(replace(swarm.recorder.latest(2), position=(9.0, 9.0, 9.0))))
+            say_hand(encode(replace(newer, signature=None)))
             say_hand(another)
             say_hand(encode(hand))
             swarm.recorder.listen(0.02)

@@ -4,9 +4,9 @@ import threading
 from typing import Any
 
 import pytest
-from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.loop import PoseWatch, command, run
@@ -87,7 +87,7 @@ def test_alone_on_the_ground_it_says_so_and_steps_at_the_slow_rate() -> None:
     assert (first.mode, first.heard, first.goal) == (Mode.GROUND, {}, GROUNDED.position)
     assert (first.position, first.battery) == (GROUNDED.position, 0.9)
     assert first.displacements == {"human-1": ORIGIN}
-    assert brain.due_ns(T0) == T0 + 25 * MS
+    assert brain.due(T0).at_ns == T0 + 25 * MS
     assert brain.step(T0 + 25 * MS, GROUNDED, 0.02).seq == 1
 
 
@@ -142,14 +142,14 @@ def test_it_steps_once_hand_and_every_live_reference_are_new() -> None:
     hear(brain, T0, hand(0), state(2, 0), state(3, 0))
     brain.step(T0, FLYING, 0.0)
     fast, slow = T0 + 8_333_333, T0 + 25 * MS
-    assert brain.due_ns(T0 + MS) == slow
+    assert brain.due(T0 + MS).at_ns == slow
     hear(brain, T0 + MS, hand(1))
     hear(brain, T0 + MS, state(2, 1))
-    assert brain.due_ns(T0 + MS) == slow
+    assert brain.due(T0 + MS).at_ns == slow
     hear(brain, T0 + MS, state(1, 9))
-    assert brain.due_ns(T0 + MS) == slow
+    assert brain.due(T0 + MS).at_ns == slow
     hear(brain, T0 + MS, state(3, 1))
-    assert brain.due_ns(T0 + MS) == fast
+    assert brain.due(T0 + MS).at_ns == fast
 
 
 def test_references_that_catch_up_with_the_hand_do_not_wait_for_the_next_one() -> None:
@@ -157,18 +157,28 @@ def test_references_that_catch_up_with_the_hand_do_not_wait_for_the_next_one() -
     hear(brain, T0, hand(1), state(2, 0), state(3, 0))
     brain.step(T0, FLYING, 0.0)
     now, used = T0 + 3 * MS, {HAND.key(): Heard(T0, 1, T0)}
-    hear(brain, now, evolve(state(2, 1), heard=used))
-    assert brain.due_ns(now) == T0 + 25 * MS, "drone 3 has not caught up"
-    hear(brain, now, evolve(state(3, 1), heard=used))
-    assert brain.due_ns(now) == T0 + 8_333_333
+    hear(brain, now, replace(state(2, 1), heard=used))
+    assert brain.due(now).at_ns == T0 + 25 * MS, "drone 3 has not caught up"
+    hear(brain, now, replace(state(3, 1), heard=used))
+    assert brain.due(now).at_ns == T0 + 8_333_333
     brain.step(T0 + 9 * MS, FLYING, 0.0)
     hear(brain, T0 + 17 * MS, hand(2))
-    assert brain.due_ns(T0 + 17 * MS) == T0 + 34 * MS, "and now it is in step with them again"
+    assert brain.due(T0 + 17 * MS).at_ns == T0 + 34 * MS, "and now it is in step with them again"
 
 
-def test_only_the_hand_and_references_trigger_a_step() -> None:
-    assert agent(4).triggers == {HAND.key(), TWO, THREE}
-    assert agent(1).triggers == {HAND.key()}
+def test_it_awaits_its_references_and_then_the_hand() -> None:
+    brain, leader = agent(4), agent(1)
+    assert brain.due(T0).awaits == leader.due(T0).awaits == [HAND.key()], "nobody has been heard yet"
+    hear(brain, T0, hand(0), state(1, 0), state(2, 0), state(3, 0))
+    assert brain.due(T0).awaits == []
+    brain.step(T0, FLYING, 0.0)
+    assert brain.due(T0).awaits == [TWO, THREE]
+    hear(brain, T0, state(1, 1), state(3, 1))
+    assert brain.due(T0).awaits == [TWO]
+    hear(brain, T0, state(2, 1))
+    assert brain.due(T0).awaits == [HAND.key()]
+    hear(brain, T0, hand(1))
+    assert brain.due(T0).awaits == []
 
 
 def test_it_does_not_wait_for_a_reference_that_is_lost_nor_for_a_silent_hand() -> None:
@@ -177,7 +187,7 @@ def test_it_does_not_wait_for_a_reference_that_is_lost_nor_for_a_silent_hand() -
     later = T0 + 600 * MS
     brain.step(later, FLYING, 0.0)
     hear(brain, later, state(2, 1))
-    assert brain.due_ns(later) == later + 8_333_333
+    assert brain.due(later).at_ns == later + 8_333_333
 
 
 def test_a_hand_that_is_not_there_moves_nothing() -> None:
@@ -212,7 +222,7 @@ def test_whatever_valid_messages_say_the_state_is_valid_too(data: Any, airborne:
     now = T0
     for _ in range(3):
         sample = data.draw(MESSAGES[HandSample])
-        references = [evolve(data.draw(MESSAGES[DroneState]), id=drone) for drone in (2, 3)]
+        references = [replace(data.draw(MESSAGES[DroneState]), id=drone) for drone in (2, 3)]
         hear(brain, now, sample, *references)
         now += data.draw(st.integers(1, 2 * NS_PER_S))
         published = brain.step(now, FLYING if airborne else GROUNDED, data.draw(st.floats(0.0, 2.0)))
@@ -275,7 +285,7 @@ def test_each_mode_has_its_command(mode: Mode, order: str) -> None:
 
 
 def test_the_age_of_a_pose_counts_from_when_it_was_first_seen() -> None:
-    watch = PoseWatch(FakeVehicle([None, FLYING, FLYING, evolve(FLYING, seq=2)], threading.Event()))
+    watch = PoseWatch(FakeVehicle([None, FLYING, FLYING, replace(FLYING, seq=2)], threading.Event()))
     assert watch.read(T0) is None
     seen = [watch.read(T0 + tick * 100 * MS) for tick in range(1, 5)]
     assert [pair[1] for pair in seen if pair] == pytest.approx([0.0, 0.1, 0.0, 0.1])

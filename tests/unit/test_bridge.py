@@ -3,9 +3,9 @@
 from typing import Any
 
 import pytest
-from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from glove_bridge.bridge import Bridge, Step
 from glove_bridge.gloves.base import Outcome, Report
@@ -186,14 +186,14 @@ def test_states_of_different_age_do_not_deform_a_moving_formation() -> None:
     hear(bridge, START)
     late = START + 200 * MS
     for drone in (1, 2):
-        moving = evolve(state(drone, ORIGIN, 1), velocity=(1.0, 0.0, 0.0), epoch=8)
+        moving = replace(state(drone, ORIGIN, 1), velocity=(1.0, 0.0, 0.0), epoch=8)
         x, y, z = FORMATION.rest[FORMATION.row(drone)].tolist()
         bridge.receive(
-            {DRONE_STATE.key(id=drone): [Arrival(encode(evolve(moving, position=(x, y, z))), START)]}
+            {DRONE_STATE.key(id=drone): [Arrival(encode(replace(moving, position=(x, y, z))), START)]}
         )
     for drone in (3, 4):
         x, y, z = FORMATION.rest[FORMATION.row(drone)].tolist()
-        moved = evolve(state(drone, (x + 0.2, y, z), 1), velocity=(1.0, 0.0, 0.0), epoch=8)
+        moved = replace(state(drone, (x + 0.2, y, z), 1), velocity=(1.0, 0.0, 0.0), epoch=8)
         bridge.receive({DRONE_STATE.key(id=drone): [Arrival(encode(moved), late)]})
     found = bridge.step(late).state
     assert found.area_ratio == pytest.approx(1.0)
@@ -225,7 +225,7 @@ def test_the_state_of_a_large_swarm_fits_into_a_payload(count: int, named: int) 
     scenario = load_scenario("grid", [f"formation.n={count}"])
     bridge = make("paper", scenario)
     for row, (x, y, z) in enumerate(build_formation(scenario).rest.tolist()):
-        message = evolve(state(1, (x, y, z), 2**40), id=row + 1, epoch=2**62)
+        message = replace(state(1, (x, y, z), 2**40), id=row + 1, epoch=2**62)
         bridge.receive({DRONE_STATE.key(id=row + 1): [Arrival(encode(message), 2**62)]})
     found = bridge.step(2**62).state
     assert len(encode(found)) <= MAX_PAYLOAD

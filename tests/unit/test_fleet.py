@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from agents.vehicles.bodies.advance import BODIES, advance
-from agents.vehicles.bodies.fleet import advance_fleet, hold, park_fleet
+from agents.vehicles.bodies.fleet import advance_fleet, hold, park_fleet, poses
 from agents.vehicles.bodies.link_loss import apply_link_loss
+from agents.vehicles.bodies.single.fleet import advance_flyer, flyers, pose_of
 from agents.vehicles.bodies.state import Command, Commands, at_rest
 
 PLACES = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
@@ -42,6 +43,18 @@ def test_held_drone_stays_and_flies_on_when_released() -> None:
     assert later.position[0, 0] > 0.5
     released = advance_fleet(hold(later, set()), fly(PLACES + np.array([1.0, 0.0, 1.0])), 1.0)
     assert released.position[1, 0] > later.position[1, 0] + 0.5
+
+
+def test_one_by_one_a_fleet_flies_as_in_its_rows() -> None:
+    goals = PLACES + np.array([0.3, 0.2, 1.0])
+    fleet = hold(advance_fleet(park_fleet(MIXED, PLACES), fly(goals), 2.0), {5})
+    alone = [
+        advance_flyer(flyer, Command.FLY.value, (x, y, z), 1.0)
+        for flyer, (x, y, z) in zip(flyers(fleet), goals.tolist(), strict=True)
+    ]
+    together = advance_fleet(fleet, fly(goals), 1.0)
+    assert [pose_of(flyer, 0.5, 7) for flyer in alone] == poses(together, [0.5] * 3, 7)
+    assert [flyer.held for flyer in alone] == [False, False, True]
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ from itertools import pairwise
 from xml.etree import ElementTree
 
 import pytest
-from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from deploy.trace.path import path_table, remarks
 from observer.path.diagram import draw_diagram
@@ -198,13 +198,13 @@ def test_a_pattern_that_comes_later_says_why() -> None:
 
 def test_numbers_count_on_across_a_restart_of_the_relay() -> None:
     def again(message: Message) -> Message:
-        later = evolve(message, epoch=2, stamp_ns=message.stamp_ns + TICKS * TICK)
+        later = replace(message, epoch=2, stamp_ns=message.stamp_ns + TICKS * TICK)
         if isinstance(later, DroneState):
             heard = {
                 key: h._replace(epoch=2, arrival_ns=h.arrival_ns + TICKS * TICK)
                 for key, h in later.heard.items()
             }
-            return evolve(later, step_ns=later.step_ns + TICKS * TICK, heard=heard)
+            return replace(later, step_ns=later.step_ns + TICKS * TICK, heard=heard)
         return later
 
     first = fly(TICKS)

@@ -118,10 +118,25 @@ def test_an_arrival_during_a_take_is_not_forgotten() -> None:
     assert inbox.take() == {"a": [Arrival(b"2", 1)]}
 
 
-def test_only_chosen_keys_wake() -> None:
-    inbox = Inbox(lambda: 0, wakes_for={"human/hand"})
-    inbox.put("drone/1/state", b"1")
+def test_only_what_is_expected_is_news_once_all_of_it_is_there() -> None:
+    inbox, news = Inbox(lambda: 0), []
+    inbox.answer = lambda: news.append(set(inbox.take()))
+    inbox.expect(["a", "b"])
+    for key in ("a", "c", "a"):
+        inbox.put(key, b"")
+    assert news == []
+    inbox.put("b", b"")
+    assert news == [{"a", "b", "c"}]
+    for key in ("a", "b", "c"):
+        inbox.put(key, b"")
+    assert len(news) == 1, "what was expected has come: nothing is until the next time"
+    inbox.expect(["a", "b"])
+    assert news[1:] == [{"a", "b", "c"}], "what is there already counts"
+
+
+def test_who_expects_nothing_gets_no_news() -> None:
+    inbox = Inbox(lambda: 0)
+    inbox.expect([])
+    inbox.put("a", b"")
     assert not inbox.wait(0.0)
-    inbox.put("human/hand", b"2")
-    assert inbox.wait(0.0)
-    assert set(inbox.take()) == {"drone/1/state", "human/hand"}
+    assert set(inbox.take()) == {"a"}

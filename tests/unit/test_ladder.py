@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from agents.control.modes import AIRBORNE_MODES
 from agents.control.steering import ESCAPE_ACCELERATION, HAND_SPEED_FACTOR, LONGEST_STEP
@@ -62,7 +63,7 @@ class Life:
 
     def live(self, now: Inputs, seconds: float) -> None:
         for _ in range(max(1, round(seconds / TICK))):
-            self.state, output = step(self.state, now._replace(position=self.position), self.rules, TICK)
+            self.state, output = step(self.state, replace(now, position=self.position), self.rules, TICK)
             mode = self.state.mode.mode
             self.setpoints.append((mode, output.setpoint))
             goal = output.setpoint if mode in AIRBORNE_MODES else (*self.position[:2], 0.0)
@@ -72,7 +73,7 @@ class Life:
 def lived(rules: Settings, story: list[tuple[dict[str, Any], int]], *, airborne: bool) -> Life:
     life = Life(rules, airborne=airborne)
     for moment, ticks in story:
-        life.live(inputs(4)._replace(**moment), ticks * TICK)
+        life.live(replace(inputs(4), **moment), ticks * TICK)
     return life
 
 
@@ -112,5 +113,5 @@ def test_stop_is_never_left(story: list[tuple[dict[str, Any], int]]) -> None:
     life = Life(settings(4), airborne=True)
     life.live(inputs(4, wish=Wish.STOP), TICK)
     for moment, ticks in story:
-        life.live(inputs(4)._replace(**moment), ticks * TICK)
+        life.live(replace(inputs(4), **moment), ticks * TICK)
         assert life.state.mode.mode is Mode.STOP

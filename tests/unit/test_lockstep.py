@@ -133,7 +133,7 @@ def test_it_takes_off_from_the_ground_follows_and_lands() -> None:
             assert {state.mode for state in states} == {Mode.FOLLOW}
             assert max(np.linalg.norm(np.array(state.position) - state.goal) for state in states) < 0.15
     assert {state.mode for state in states} == {Mode.GROUND}
-    assert swarm.fleet.position[:, 2] == pytest.approx(0.0, abs=1e-6)
+    assert [flyer.body.position[2] for flyer in swarm.flyers] == pytest.approx([0.0] * 4, abs=1e-6)
     assert all(modes >= {Mode.TAKEOFF, Mode.FOLLOW, Mode.LAND, Mode.GROUND} for modes in seen)
 
 

@@ -4,9 +4,9 @@ import math
 from typing import Any
 
 import pytest
-from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from agents.control.modes import ModeInputs, ModeState, initial_mode, next_mode
 from shared.messages import Mode, Wish
@@ -23,30 +23,30 @@ CALM = ModeInputs(
     references_follow=True,
 )
 """In the air with everything as it should be."""
-DOWN = evolve(CALM, height=0.0)
+DOWN = replace(CALM, height=0.0)
 AIRBORNE = [Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND]
 
 
 def after(mode: Mode, **changes: Any) -> Mode:
     """The mode one step later, in the air unless said otherwise."""
-    return next_mode(ModeState(mode=mode), evolve(CALM, **changes)).mode
+    return next_mode(ModeState(mode=mode), replace(CALM, **changes)).mode
 
 
 def test_a_whole_flight() -> None:
     state = initial_mode(airborne=False)
     seen = []
     for inputs in (
-        evolve(DOWN, wish=None, hand_age=NEVER),
-        evolve(DOWN, wish=Wish.GROUND),
+        replace(DOWN, wish=None, hand_age=NEVER),
+        replace(DOWN, wish=Wish.GROUND),
         DOWN,
-        evolve(CALM, height=0.6),
+        replace(CALM, height=0.6),
         CALM,
-        evolve(CALM, wish=Wish.HOLD),
+        replace(CALM, wish=Wish.HOLD),
         CALM,
-        evolve(CALM, wish=Wish.LAND),
-        evolve(CALM, wish=Wish.LAND, height=0.6),
-        evolve(DOWN, wish=Wish.LAND),
-        evolve(DOWN, wish=Wish.LAND),
+        replace(CALM, wish=Wish.LAND),
+        replace(CALM, wish=Wish.LAND, height=0.6),
+        replace(DOWN, wish=Wish.LAND),
+        replace(DOWN, wish=Wish.LAND),
         DOWN,
     ):
         state = next_mode(state, inputs)
@@ -173,28 +173,28 @@ def test_stop_is_latched(inputs: ModeInputs, asked: bool) -> None:
 @pytest.mark.parametrize("mode", [Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD])
 @pytest.mark.parametrize("asking", [Wish.GROUND, Wish.LAND, Wish.HOLD])
 def test_after_a_landing_that_nobody_wished_the_operator_has_to_ask_again(mode: Mode, asking: Wish) -> None:
-    state = next_mode(ModeState(mode=mode), evolve(CALM, hand_age=10.5))
+    state = next_mode(ModeState(mode=mode), replace(CALM, hand_age=10.5))
     assert state == ModeState(mode=Mode.LAND, must_ask_again=True)
     for inputs in (CALM, DOWN, DOWN, DOWN):
         state = next_mode(state, inputs)
     assert state == ModeState(mode=Mode.GROUND, must_ask_again=True)
-    stale = next_mode(state, evolve(DOWN, wish=asking, hand_age=0.3))
+    stale = next_mode(state, replace(DOWN, wish=asking, hand_age=0.3))
     assert next_mode(stale, DOWN).mode is Mode.GROUND
-    asked = next_mode(state, evolve(DOWN, wish=asking))
+    asked = next_mode(state, replace(DOWN, wish=asking))
     assert asked == ModeState(mode=Mode.GROUND)
     assert next_mode(asked, DOWN).mode is Mode.TAKEOFF
 
 
 @pytest.mark.parametrize("wish", [Wish.GROUND, Wish.LAND])
 def test_after_a_landing_on_wish_to_fly_is_asking_again(wish: Wish) -> None:
-    state = next_mode(ModeState(mode=Mode.FOLLOW), evolve(CALM, wish=wish))
-    for inputs in (evolve(DOWN, wish=wish), DOWN):
+    state = next_mode(ModeState(mode=Mode.FOLLOW), replace(CALM, wish=wish))
+    for inputs in (replace(DOWN, wish=wish), DOWN):
         state = next_mode(state, inputs)
     assert state.mode is Mode.TAKEOFF
 
 
 def test_a_wish_to_land_that_is_older_than_the_patience_is_nobodys_wish() -> None:
-    state = next_mode(ModeState(mode=Mode.HOLD), evolve(CALM, wish=Wish.LAND, hand_age=10.5))
+    state = next_mode(ModeState(mode=Mode.HOLD), replace(CALM, wish=Wish.LAND, hand_age=10.5))
     assert state == ModeState(mode=Mode.LAND, must_ask_again=True)
 
 
@@ -211,7 +211,7 @@ def test_from_wherever_it_is_the_operator_brings_it_down_and_up_again(
 ) -> None:
     state = reached([i for i in history if i.wish is not Wish.STOP], airborne=airborne)
     assert state.mode is not Mode.STOP
-    for inputs in (evolve(CALM, wish=Wish.LAND), evolve(DOWN, wish=Wish.LAND)):
+    for inputs in (replace(CALM, wish=Wish.LAND), replace(DOWN, wish=Wish.LAND)):
         state = next_mode(state, inputs)
     assert state == ModeState(mode=Mode.GROUND)
     for inputs, mode in ((DOWN, Mode.TAKEOFF), (CALM, Mode.FOLLOW)):

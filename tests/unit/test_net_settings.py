@@ -83,6 +83,14 @@ def test_the_field_has_certificates_rules_and_guards(field: Scenario) -> None:
     assert settings["low_pass_filter"][0]["size_limit"] > MAX_PAYLOAD
 
 
+@pytest.mark.parametrize("node", NODES)
+def test_a_batch_has_room_for_every_message_and_a_stalled_link_holds_little(node: str) -> None:
+    tx = node_settings(load_scenario("rhombus"), RHOMBUS, node)["transport"]["link"]["tx"]
+    longest = max(len(f"{'s' * 32}/{topic.key(id=99999, role='observer')}") for topic in TOPICS)
+    assert MAX_PAYLOAD + longest + 256 <= tx["batch_size"]
+    assert tx["batch_size"] * tx["queue"]["size"]["real_time"] <= 2**17
+
+
 def test_beside_an_endpoint_of_datagrams_stands_one_of_tcp() -> None:
     scenario = load_scenario("rhombus", ["net.endpoint=udp/{node}.local:7447"])
     settings = node_settings(scenario, RHOMBUS, "drone/1")

@@ -1,7 +1,10 @@
 """What every process does alike: arguments from the environment, and a watchdog that hears of the loop."""
 
 import argparse
+import platform
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -36,6 +39,29 @@ def test_without_environment_a_scenario_is_demanded(
     with pytest.raises(SystemExit):
         parsed()
     assert "--scenario" in capsys.readouterr().err
+
+
+ARENAS = """
+import ctypes, threading
+from shared.process import prepare_process
+
+libc = ctypes.CDLL(None)
+prepare_process("x")
+together = threading.Barrier(8)
+threads = [threading.Thread(target=together.wait) for _ in range(8)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+libc.malloc_info(0, ctypes.c_void_p.in_dll(libc, "stdout"))
+libc.fflush(None)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="asks glibc how many arenas it has")
+def test_all_threads_share_one_arena() -> None:
+    told = subprocess.run([sys.executable, "-c", ARENAS], check=True, capture_output=True, text=True).stdout
+    assert told.count("<heap nr=") == 1
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from agents.agent import FORGOTTEN_AFTER, Agent
 from agents.control.modes import CRITICAL_BATTERY, LOW_BATTERY, POSE_LOST
@@ -61,10 +62,10 @@ def test_at_rest_the_formation_keeps_its_shape_whoever_is_gone(
 
 def test_with_every_ancestor_gone_the_human_leads_alone() -> None:
     rules = settings(4)
-    state, now = hovering(4, rules), inputs(4)._replace(references=(SILENT_2, SILENT_3, SILENT_1))
+    state, now = hovering(4, rules), replace(inputs(4), references=(SILENT_2, SILENT_3, SILENT_1))
     for k in range(120):
         moved = hand(-0.3 * k * TICK, velocity=(-0.3, 0, 0), stamp=k * TICK)
-        state, output = step(state, now._replace(hand=moved), rules, TICK)
+        state, output = step(state, replace(now, hand=moved), rules, TICK)
     assert state.mode.mode is Mode.FOLLOW
     assert output.goal[0] < REST[4][0] - 0.4
 
@@ -79,7 +80,7 @@ def test_a_stand_in_moves_its_links_as_the_lost_drone_would() -> None:
         leader, led = step(leader, inputs(1, hand=moved), lead, TICK)
         follower, output = step(follower, inputs(2, hand=moved, references=(SILENT_1,)), rules, TICK)
     expected = inputs(2, hand=moved, references=(reference(led.goal),))
-    healthy = follower._replace(stand_ins=hovering(2, rules).stand_ins)
+    healthy = replace(follower, stand_ins=hovering(2, rules).stand_ins)
     _, wanted = step(healthy, expected, rules, TICK)
     assert output.goal == pytest.approx(wanted.goal, abs=0.02)
 
@@ -114,10 +115,10 @@ def test_who_is_back_is_trusted_only_after_a_while() -> None:
 def test_a_holding_drone_behind_a_lost_one_is_held() -> None:
     """A follower of a lost follower of one that holds does not fly on alone."""
     rules = settings(4)
-    holding = inputs(4)._replace(references=(SILENT_2, SILENT_3, reference(REST[1], mode=Mode.HOLD)))
+    holding = replace(inputs(4), references=(SILENT_2, SILENT_3, reference(REST[1], mode=Mode.HOLD)))
     state, _ = repeat(hovering(4, rules), holding, rules, 1.0)
     assert state.mode.mode is Mode.HOLD
-    following = holding._replace(references=(SILENT_2, SILENT_3, reference(REST[1])))
+    following = replace(holding, references=(SILENT_2, SILENT_3, reference(REST[1])))
     state, _ = repeat(state, following, rules, 0.1)
     assert state.mode.mode is Mode.FOLLOW
 

@@ -10,6 +10,7 @@ import pytest
 from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from deploy.cli import main
 from observer.report.figures import FIGURES
@@ -207,7 +208,7 @@ def test_a_trace_becomes_a_record_of_the_time_in_formation(tmp_path: Path) -> No
     on_ground = 20
     first = next(m for m in messages if isinstance(m, DroneState) and (m.id, m.seq) == (4, on_ground))
     early = [
-        evolve(m, mode=Mode.TAKEOFF) if isinstance(m, DroneState) and m.stamp_ns < first.stamp_ns else m
+        replace(m, mode=Mode.TAKEOFF) if isinstance(m, DroneState) and m.stamp_ns < first.stamp_ns else m
         for m in messages
     ]
     begun = first.stamp_ns + 200 * MS
@@ -239,7 +240,7 @@ def test_what_cannot_be_reported_is_refused_with_the_reason(
     short = write_trace(tmp_path / "short", fly(100))
     with pytest.raises(ConfigError, match=r"flew for 1\.\d s; a report needs at least 3 s"):
         open_record(short)
-    grounded = [evolve(m, mode=Mode.GROUND) if isinstance(m, DroneState) else m for m in fly(20)]
+    grounded = [replace(m, mode=Mode.GROUND) if isinstance(m, DroneState) else m for m in fly(20)]
     with pytest.raises(ConfigError, match="the whole formation never flew"):
         open_record(write_trace(tmp_path / "ground", grounded))
     assert main(["trace", "report", str(tmp_path / "nothing"), "-o", str(tmp_path / "out")]) == 2

@@ -4,9 +4,9 @@ import logging
 from typing import Any
 
 import pytest
-from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from shared.clock import NS_PER_S
 from shared.codec import encode
@@ -59,7 +59,7 @@ def test_the_newest_of_several_is_kept_with_its_arrival() -> None:
     sensing = senses()
     sensing.take(
         {
-            HAND.key(): [Arrival(encode(evolve(SAMPLE, seq=seq)), 100 + seq) for seq in (10, 11, 12)],
+            HAND.key(): [Arrival(encode(replace(SAMPLE, seq=seq)), 100 + seq) for seq in (10, 11, 12)],
             TWO: [Arrival(encode(STATE), 50)],
         }
     )
@@ -75,7 +75,7 @@ def test_the_newest_of_several_is_kept_with_its_arrival() -> None:
 def test_whatever_the_order_the_newest_wins_and_every_older_one_is_counted(order: list[int]) -> None:
     sensing = senses()
     for seq in order:
-        hear(sensing, HAND.key(), evolve(SAMPLE, seq=seq))
+        hear(sensing, HAND.key(), replace(SAMPLE, seq=seq))
     newest, late = -1, 0
     for seq in order:
         late += seq < newest
@@ -88,7 +88,7 @@ def test_whatever_the_order_the_newest_wins_and_every_older_one_is_counted(order
 def test_a_repeated_or_older_sample_is_out_of_order_however_late(seq: int) -> None:
     sensing = senses()
     hear(sensing, HAND.key(), SAMPLE)
-    hear(sensing, HAND.key(), evolve(SAMPLE, seq=seq), at=100 * SILENCE_NS)
+    hear(sensing, HAND.key(), replace(SAMPLE, seq=seq), at=100 * SILENCE_NS)
     assert sensing.rejected == {"out-of-order": 1}
     assert sensing.hand is not None
     assert sensing.hand.arrival_ns == 0
@@ -96,7 +96,7 @@ def test_a_repeated_or_older_sample_is_out_of_order_however_late(seq: int) -> No
 
 def test_a_restarted_publisher_is_heard_from_its_first_sample() -> None:
     sensing = senses()
-    hear(sensing, HAND.key(), SAMPLE, evolve(SAMPLE, epoch=6, seq=0))
+    hear(sensing, HAND.key(), SAMPLE, replace(SAMPLE, epoch=6, seq=0))
     assert kept(sensing) == (6, 0)
     assert not sensing.rejected
 
@@ -104,20 +104,20 @@ def test_a_restarted_publisher_is_heard_from_its_first_sample() -> None:
 def test_an_older_epoch_is_heard_only_after_the_newer_one_has_fallen_silent() -> None:
     """Or a publisher whose clock was set back would never be heard again."""
     sensing = senses()
-    older = evolve(SAMPLE, epoch=4, seq=99)
+    older = replace(SAMPLE, epoch=4, seq=99)
     hear(sensing, HAND.key(), SAMPLE)
     hear(sensing, HAND.key(), older, at=SILENCE_NS)
     assert kept(sensing) == (5, 10)
     assert sensing.rejected == {"out-of-order": 1}
     hear(sensing, HAND.key(), older, at=SILENCE_NS + 1)
     assert kept(sensing) == (4, 99)
-    hear(sensing, HAND.key(), evolve(older, seq=98), at=SILENCE_NS + 2)
+    hear(sensing, HAND.key(), replace(older, seq=98), at=SILENCE_NS + 2)
     assert kept(sensing) == (4, 99)
 
 
 def test_a_drone_is_only_heard_on_its_own_key() -> None:
     sensing = senses()
-    hear(sensing, TWO, evolve(STATE, id=3))
+    hear(sensing, TWO, replace(STATE, id=3))
     hear(sensing, DRONE_STATE.key(id=3), STATE)
     assert not sensing.drones
     assert sensing.rejected == {"wrong-id": 2}
@@ -127,7 +127,7 @@ def test_a_drone_is_only_heard_on_its_own_key() -> None:
 def test_other_keys_are_unknown(key: str) -> None:
     """Its own state, too: nobody else speaks for this drone."""
     sensing = senses()
-    hear(sensing, key, evolve(STATE, id=4))
+    hear(sensing, key, replace(STATE, id=4))
     assert sensing.rejected == {"unknown-key": 1}
 
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from msgspec.structs import asdict
 
 from agents.control import avoidance as many_avoidance
 from agents.control import goals as many_goals
@@ -16,12 +17,14 @@ from agents.control import impedance as many_links
 from agents.control import steering as many_steering
 from agents.control import trajectory as many_trajectory
 from agents.control.avoidance import COLUMN_BUBBLE, DRONE_BUBBLE, HAND_BUBBLE, Encounters
+from agents.control.hand import MappedHand
 from agents.control.single import avoidance, goals, impedance, steering, trajectory, vectors
 from agents.control.single.avoidance import Encounter
 from agents.control.single.vectors import Planar, Vector
 from agents.settings import single_steering_settings, steering_settings
 from shared.config import load_scenario
 from shared.formation import build_formation
+from shared.messages import Mode
 from shared.scenario import Avoidance
 
 Vec = npt.NDArray[np.float64]
@@ -56,7 +59,7 @@ def row(values: Sequence[float]) -> Vec:
 
 
 def in_arrays(one: trajectory.Trajectory) -> many_trajectory.Trajectory:
-    return many_trajectory.Trajectory(**{name: row(value) for name, value in one._asdict().items()})
+    return many_trajectory.Trajectory(**{name: row(value) for name, value in asdict(one).items()})
 
 
 def pairs(others: Sequence[Encounter]) -> Encounters:
@@ -125,13 +128,14 @@ def test_links_and_goals(
     theirs, their_rate = many_goals.corrections(many, together)
     assert same(mine, theirs)
     assert same(rate, their_rate)
-    seen = len(one.weights)
-    goal = np.add(goals.weighted(one, points[:seen]), goals.place(one, mine, yaw))
-    assert same(goal, many_goals.goals(many, np.array(points[:seen]), theirs, yaw))
+    human, *others = list(zip(points, speeds, strict=True))[: len(one.weights)]
+    hand = MappedHand(point=human[0], velocity=human[1], yaw=yaw, yaw_rate=yaw_rate, stamp=0.0)
+    lead = [goals.Guide(point, velocity, Mode.FOLLOW) for point, velocity in others]
+    goal, goal_velocity = goals.goal_of(one, alone, hand, lead, None)
+    seen = [np.array(vectors[: len(one.weights)]) for vectors in (points, speeds)]
+    assert same(goal, many_goals.goals(many, seen[0], theirs, yaw))
     moving = many_goals.place_velocities(many, theirs, their_rate, yaw, yaw_rate)
-    assert same(goals.place_velocity(one, mine, rate, yaw, yaw_rate), moving)
-    moved = np.add(goals.weighted(one, speeds[:seen]), goals.place_velocity(one, mine, rate, yaw, yaw_rate))
-    assert same(moved, many_goals.goal_velocities(many, np.array(speeds[:seen]), moving))
+    assert same(goal_velocity, many_goals.goal_velocities(many, seen[1], moving))
 
 
 @given(TRAJECTORIES, PLACES, SPEEDS, STEPS, st.floats(0.1, 3.0), st.floats(0.1, 10.0))
@@ -143,10 +147,10 @@ def test_trajectory(
         trajectory.tracking_velocity(one, goal, dt, acceleration),
         many_trajectory.tracking_velocity(many, row(goal), dt, acceleration),
     )
-    alone = trajectory.advance(one, goal, wanted, dt, speed, acceleration)
+    point, velocity = trajectory.advance(one, wanted, dt, speed, acceleration)
     together = many_trajectory.advance(many, row(goal), row(wanted), dt, speed, acceleration)
-    for name, value in alone._asdict().items():
-        assert same(value, getattr(together, name)), name
+    assert same(point, together.point)
+    assert same(velocity, together.velocity)
 
 
 @given(PLANAR, PLANAR, OTHERS, PLANAR, BUBBLES, FIELDS)
@@ -248,6 +252,6 @@ def test_steering(
     )
     # Wanted velocities are ways divided by dt: what they are rounded to grows with it.
     assert np.allclose(one.setpoint, many.setpoint[0], rtol=1e-12, atol=1e-12)
-    for name, value in one.trajectory._asdict().items():
+    for name, value in asdict(one.trajectory).items():
         assert np.allclose(value, getattr(many.trajectory, name)[0], rtol=1e-12, atol=1e-12), name
     assert (one.avoiding, one.fenced) == (many.avoiding[0, 0], many.fenced[0, 0])

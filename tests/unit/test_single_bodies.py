@@ -39,7 +39,7 @@ def test_one_body_is_its_row(
         command = Commands(np.array([kind], dtype=np.int8), np.array([setpoint]))
         for _ in range(substeps):
             many = BODIES[body](many, command, substep)
-            one = ONE_BY_ONE[BODIES[body]](one, kind.value, setpoint, substep)
+        one = ONE_BY_ONE[BODIES[body]](one, kind.value, setpoint, substep, substeps)
         assert_same(together([one]), many)
 
 

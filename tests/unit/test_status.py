@@ -5,7 +5,7 @@ import re
 from io import StringIO
 
 import pytest
-from attrs import evolve
+from msgspec.structs import replace
 from rich.console import Console
 
 from deploy.cli import main
@@ -85,7 +85,7 @@ def test_who_is_linked_and_who_was_refused_is_shown_by_name_and_is_no_illness() 
     audit = Audit(["relay", "drone/2"])
     audit.linked("3551f63a5eee", "relay", present=True)
     audit.linked("7777", "mallory", present=True)
-    seen = evolve(status(), metrics={"late": 1.0, **audit.metrics()})
+    seen = replace(status(), metrics={"late": 1.0, **audit.metrics()})
     rows = [judge("drone/1", Heard(present=True, status=seen, state=drone())), judge("relay/0", Heard())]
     assert rows[0].well
     assert [(line["links"], line["refused"]) for line in status_json(rows)] == [

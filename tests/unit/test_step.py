@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from agents.agent import Agent
 from agents.control.hand import HandInput
@@ -48,7 +49,7 @@ def reference(point: Triple, **changes: Any) -> Reference:
     known = Reference(
         point=vector(point), velocity=ORIGIN, goal_velocity=ORIGIN, mode=Mode.FOLLOW, age=0.0, fresh=True
     )
-    return known._replace(**changes)
+    return replace(known, **changes)
 
 
 def drones(*places: Triple) -> list[Encounter]:
@@ -74,9 +75,9 @@ def inputs(drone: int, **changes: Any) -> Inputs:
         }[drone],
         drones=drones(),
     )
-    now = calm._replace(**changes)
+    now = replace(calm, **changes)
     # Drone 4 knows its ancestor, drone 1, too.
-    return now._replace(references=(*now.references, reference(REST[1]))) if drone == 4 else now
+    return replace(now, references=(*now.references, reference(REST[1]))) if drone == 4 else now
 
 
 def hovering(drone: int, rules: Settings) -> State:
@@ -175,7 +176,7 @@ def test_a_silent_reference_is_extrapolated_within_its_bound(velocity: Triple, a
     _, output = step(hovering(2, rules), inputs(2, references=(silent,)), rules, TICK)
     assert np.subtract(output.goal, REST[2]) == pytest.approx(way)
     assert output.flags == Flag.EXTRAPOLATING
-    heard = silent._replace(fresh=True)
+    heard = replace(silent, fresh=True)
     _, output = step(hovering(2, rules), inputs(2, references=(heard,)), rules, TICK)
     assert output.goal == pytest.approx(REST[2])
     assert output.flags == Flag(0)
@@ -208,7 +209,7 @@ def test_a_silent_hand_is_no_longer_coming_closer() -> None:
     state = hovering(1, rules)
     silent = inputs(1, hand=hand(velocity=(-1.5, 0, 0)), hand_age=2.0, hand_fresh=False)
     for _ in range(600):
-        state, output = step(state, silent._replace(position=position), rules, TICK)
+        state, output = step(state, replace(silent, position=position), rules, TICK)
         position = towards(position, output.setpoint, TICK / 0.3)
     assert math.dist(position, output.goal) < 0.05
 
@@ -242,8 +243,8 @@ def test_the_links_feel_the_hand_in_the_frame_of_the_formation() -> None:
     rules = settings(1)
     state, turned = hovering(1, rules), (0.0, -0.5, 1.2)
     for k in range(1, 31):
-        moving = hand(0.0, -0.6 * k * TICK, velocity=(0, -0.6, 0), stamp=k * TICK)._replace(yaw=math.pi / 2)
-        first = state._replace(hand=None) if k == 1 else state
+        moving = replace(hand(0.0, -0.6 * k * TICK, velocity=(0, -0.6, 0), stamp=k * TICK), yaw=math.pi / 2)
+        first = replace(state, hand=None) if k == 1 else state
         state, output = step(first, inputs(1, hand=moving, position=turned), rules, TICK)
     assert state.links[0].displacement[0] > 0.05
     assert state.links[0].displacement[1:] == pytest.approx((0.0, 0.0))

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+
+from msgspec import Struct
 
 from agents.control.avoidance import FLOOR, STANDSTILL, Bubble
-from agents.control.single.vectors import Planar
+from agents.control.single.vectors import Planar, Vector
 from shared.scenario import FieldSettings
 
 Encounter = tuple[float, float, float, float]
@@ -15,7 +16,7 @@ COINCIDENT = 1e-9
 """Nearer than this there is no direction away from a centre: a point leaves along +x, m."""
 
 
-class Threat(NamedTuple):
+class Threat(Struct, frozen=True):
     """An encounter that demands an escape.
 
     Attributes:
@@ -50,18 +51,25 @@ def repulsion(x: float, y: float, settings: FieldSettings) -> Planar:
     return (strength * (x / distance), strength * (y / distance))
 
 
-def separation(point: Planar, others: Iterable[Encounter], settings: FieldSettings) -> Planar:
+def separation(point: Planar | Vector, others: Iterable[Encounter], settings: FieldSettings) -> Planar:
     """Returns the summed repulsion of the encounters, m/s."""
-    x, y = point
+    x, y = point[0], point[1]
+    reach = (settings.radius + settings.d0) ** 2
     u = v = 0.0
     for ox, oy, _, _ in others:
-        pu, pv = repulsion(x - ox, y - oy, settings)
-        u, v = u + pu, v + pv
+        dx, dy = x - ox, y - oy
+        if dx * dx + dy * dy < reach:
+            pu, pv = repulsion(dx, dy, settings)
+            u, v = u + pu, v + pv
     return (u, v)
 
 
 def column_velocity(
-    point: Planar, goal: Planar, columns: Iterable[Planar], settings: FieldSettings, xi: float
+    point: Planar | Vector,
+    goal: Planar | Vector,
+    columns: Iterable[Planar],
+    settings: FieldSettings,
+    xi: float,
 ) -> tuple[Planar, bool]:
     """Returns `-grad U`, m/s, and whether any column acts on the point.
 
@@ -72,7 +80,7 @@ def column_velocity(
         settings: Field of a column.
         xi: Gain of the attraction, 1/s.
     """
-    x, y = point
+    x, y = point[0], point[1]
     u = v = 0.0
     near = False
     for cx, cy in columns:
@@ -82,7 +90,9 @@ def column_velocity(
     return (xi * (goal[0] - x) + u, xi * (goal[1] - y) + v), near
 
 
-def threats(point: Planar, velocity: Planar, others: Iterable[Encounter], bubble: Bubble) -> list[Threat]:
+def threats(
+    point: Planar | Vector, velocity: Planar | Vector, others: Iterable[Encounter], bubble: Bubble
+) -> list[Threat]:
     """Returns the encounters whose bubble the point is in; mostly there are none.
 
     Args:
@@ -91,15 +101,16 @@ def threats(point: Planar, velocity: Planar, others: Iterable[Encounter], bubble
         others: What to keep away from.
         bubble: How far.
     """
-    x, y = point
-    u, v = velocity
+    x, y, u, v = point[0], point[1], velocity[0], velocity[1]
     radius, lead = bubble.radius, bubble.lead
     found = []
     for ox, oy, ou, ov in others:
         dx, dy = x - ox, y - oy
         du, dv = ou - u, ov - v
         squared = dx * dx + dy * dy
-        if squared > radius * radius and du * dx + dv * dy <= 0.0:
+        outside = squared - radius * radius
+        # No root is needed to see that it is far enough: 2 distance (distance - radius) is larger than that.
+        if outside > 0.0 and 2.0 * lead * (du * dx + dv * dy) < outside:
             continue
         distance = math.sqrt(squared)
         hx, hy = (dx / distance, dy / distance) if distance > COINCIDENT else (1.0, 0.0)
@@ -115,16 +126,19 @@ def escape(wanted: Planar, pressing: Iterable[Threat]) -> Planar:
     """Returns the velocity to add to `wanted` so that every threat is evaded fast enough, m/s."""
     u, v = wanted
     eu = ev = 0.0
-    for (hx, hy), needed, (dx, dy) in pressing:
-        missing = needed - (u * hx + v * hy)
+    for threat in pressing:
+        (hx, hy), (dx, dy) = threat.heading, threat.direction
+        missing = threat.needed - (u * hx + v * hy)
         if missing > 0.0:
             eu, ev = eu + missing * dx, ev + missing * dy
     return (eu, ev)
 
 
-def columns_near(point: Planar, velocity: Planar, columns: Sequence[Planar], bubble: Bubble) -> list[Encounter]:
+def columns_near(
+    point: Planar | Vector, velocity: Planar | Vector, columns: Sequence[Planar], bubble: Bubble
+) -> list[Encounter]:
     """Returns the columns whose bubbles can matter to a point that moves with a velocity."""
-    x, y = point
+    x, y = point[0], point[1]
     reach = bubble.radius + bubble.lead * math.sqrt(velocity[0] ** 2 + velocity[1] ** 2)
     return [(cx, cy, 0.0, 0.0) for cx, cy in columns if (x - cx) ** 2 + (y - cy) ** 2 < reach * reach]
 

@@ -4,15 +4,27 @@ import math
 from collections.abc import Sequence
 
 from attrs import frozen
+from msgspec import Struct
 
 from agents.control.hand import MappedHand
 from agents.control.single.impedance import LinkState
 from agents.control.single.vectors import Vector, clamp, rotate, vector
 from shared.formation import Formation, Link
-from shared.messages import MAX_POSITION, MAX_VELOCITY
+from shared.messages import MAX_POSITION, MAX_VELOCITY, Mode
 
-_FARTHEST: Vector = (MAX_POSITION, MAX_POSITION, MAX_POSITION)
-_FASTEST: Vector = (MAX_VELOCITY, MAX_VELOCITY, MAX_VELOCITY)
+
+class Guide(Struct, frozen=True):
+    """What a drone follows in the place of one reference.
+
+    Attributes:
+        point: Where it is, or should be, m.
+        goal_velocity: m/s.
+        mode: Its mode, or that of whoever stands behind it.
+    """
+
+    point: Vector
+    goal_velocity: Vector
+    mode: Mode
 
 
 @frozen(kw_only=True)
@@ -50,17 +62,17 @@ def correction(row: Row, states: Sequence[LinkState]) -> tuple[Vector, Vector]:
     `(-|sum dx|, sum dy, sum dz)` over the links; each term is clamped per axis, and a clamped term has no rate.
     """
     x = y = z = u = v = w = 0.0
-    for link, ((dx, dy, dz), (rx, ry, rz)) in zip(row.links, states, strict=True):
-        limit = link.limit
-        if -limit <= dx <= limit:
+    for i, link in enumerate(row.links):
+        (dx, dy, dz), (rx, ry, rz), limit = states[i].displacement, states[i].rate, link.limit
+        if abs(dx) <= limit:
             x, u = x + dx, u + rx
         else:
             x += math.copysign(limit, dx)
-        if -limit <= dy <= limit:
+        if abs(dy) <= limit:
             y, v = y + dy, v + ry
         else:
             y += math.copysign(limit, dy)
-        if -limit <= dz <= limit:
+        if abs(dz) <= limit:
             z, w = z + dz, w + rz
         else:
             z += math.copysign(limit, dz)
@@ -69,63 +81,43 @@ def correction(row: Row, states: Sequence[LinkState]) -> tuple[Vector, Vector]:
     return (-k * abs(x), k * y, k * z), (k * retreat, k * v, k * w)
 
 
-def weighted(row: Row, vectors: Sequence[Vector]) -> Vector:
-    """Returns the weighted sum over `[human, references]` of their points or velocities."""
-    x = y = z = 0.0
-    for weight, (a, b, c) in zip(row.weights, vectors, strict=True):
-        x, y, z = x + weight * a, y + weight * b, z + weight * c
-    return (x, y, z)
-
-
 def goal_of(
     row: Row,
     links: Sequence[LinkState],
     hand: MappedHand,
-    points: Sequence[Vector],
-    velocities: Sequence[Vector],
+    lead: Sequence[Guide],
     heights: Sequence[float] | None,
 ) -> tuple[Vector, Vector]:
     """Returns goal and goal velocity of one row: Eqs. 11-13, or the same on the references' goals.
+
+    The goal is the weighted mean of the references plus `R(yaw) (offset + correction)`.
 
     Args:
         row: The row.
         links: State of its links.
         hand: The mapped hand.
-        points: Of its references, m.
-        velocities: Their goal velocities, m/s.
-        heights: Rest heights of the references above the hand, m; None uses those of their points.
+        lead: Its references.
+        heights: Their rest heights above the hand, m; None uses those of their points.
     """
-    if heights is not None:
-        points = [(x, y, hand.point[2] + height) for (x, y, _), height in zip(points, heights, strict=True)]
-    own, rate = correction(row, links)
-    x, y, z = weighted(row, [hand.point, *points])
-    u, v, w = weighted(row, [hand.velocity, *velocities])
-    a, b, c = place(row, own, hand.yaw)
-    d, e, f = place_velocity(row, own, rate, hand.yaw, hand.yaw_rate)
+    (ox, oy, oz), yaw, turning = row.offset, hand.yaw, hand.yaw_rate
+    (x, y, z), (u, v, w) = correction(row, links)
+    x, y, z = ox + x, oy + y, oz + z
+    gx, gy, gz = rotate((x, y, z), yaw)
+    gu, gv, gw = rotate((u - turning * y, v + turning * x, w), yaw)
+    weight, (x, y, z), (u, v, w) = row.weights[0], hand.point, hand.velocity
+    x, y, z, u, v, w = weight * x, weight * y, weight * z, weight * u, weight * v, weight * w
+    for i, guide in enumerate(lead):
+        weight, (a, b, c), (d, e, f) = row.weights[i + 1], guide.point, guide.goal_velocity
+        if heights is not None:
+            c = hand.point[2] + heights[i]
+        x, y, z = x + weight * a, y + weight * b, z + weight * c
+        u, v, w = u + weight * d, v + weight * e, w + weight * f
     # A goal that no receiver would accept, because a reference is at the edge of the range, helps nobody.
-    return _within((x + a, y + b, z + c), _FARTHEST), _within((u + d, v + e, w + f), _FASTEST)
+    return _within(x + gx, y + gy, z + gz, MAX_POSITION), _within(u + gu, v + gv, w + gw, MAX_VELOCITY)
 
 
-def _within(vector: Vector, largest: Vector) -> Vector:
-    x, y, z = largest
-    return clamp(vector, (-x, -y, -z), largest)
-
-
-def place(row: Row, correction: Vector, yaw: float) -> Vector:
-    """Returns where the goal is from its references, world frame, m: `R(yaw) (offset + correction)`."""
-    (x, y, z), (a, b, c) = row.offset, correction
-    return rotate((x + a, y + b, z + c), yaw)
-
-
-def place_velocity(row: Row, correction: Vector, rate: Vector, yaw: float, yaw_rate: float) -> Vector:
-    """Returns how fast `place` changes, world frame, m/s.
-
-    Args:
-        row: Of this drone.
-        correction: Formation frame, m.
-        rate: Its rate, formation frame, m/s.
-        yaw: Heading of the formation, rad.
-        yaw_rate: rad/s.
-    """
-    (x, y, _), (a, b, _), (u, v, w) = row.offset, correction, rate
-    return rotate((u - yaw_rate * (y + b), v + yaw_rate * (x + a), w), yaw)
+def _within(x: float, y: float, z: float, limit: float) -> Vector:
+    """Returns the nearest vector whose components are at most `limit`."""
+    if math.hypot(x, y, z) <= limit:
+        return (x, y, z)
+    return clamp((x, y, z), (-limit, -limit, -limit), (limit, limit, limit))

@@ -1,17 +1,15 @@
 """Impedance links into one drone, see `agents.control.impedance` for their equation."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+
+from msgspec import Struct
 
 from agents.control.impedance import discretise
 from agents.control.single.vectors import ORIGIN, Vector
 from shared.formation import Link
 
-Transition = tuple[float, float, float, float, float, float]
-"""Ad00, Ad01, Ad10, Ad11, Bd0, Bd1 of `discretise`."""
 
-
-class LinkState(NamedTuple):
+class LinkState(Struct, frozen=True):
     """Displacement, m, and rate, m/s, of one link in the formation's frame."""
 
     displacement: Vector
@@ -32,19 +30,12 @@ def step_links(
         hand_velocity: Mapped hand velocity in the formation's frame, m/s, held over the step.
         dt: Step, s, > 0.
     """
-    return tuple(
-        [
-            _step_link(state, discretise(link.mass, link.damping, link.stiffness, link.gain, dt), hand_velocity)
-            for state, link in zip(states, links, strict=True)
-        ]
-    )
-
-
-def _step_link(state: LinkState, transition: Transition, hand_velocity: Vector) -> LinkState:
-    a00, a01, a10, a11, b0, b1 = transition
-    (x, y, z), (u, v, w) = state
     hx, hy, hz = hand_velocity
-    return LinkState(
-        (a00 * x + a01 * u + b0 * hx, a00 * y + a01 * v + b0 * hy, a00 * z + a01 * w + b0 * hz),
-        (a10 * x + a11 * u + b1 * hx, a10 * y + a11 * v + b1 * hy, a10 * z + a11 * w + b1 * hz),
-    )
+    stepped = []
+    for i, link in enumerate(links):
+        a00, a01, a10, a11, b0, b1 = discretise(link.mass, link.damping, link.stiffness, link.gain, dt)
+        (x, y, z), (u, v, w) = states[i].displacement, states[i].rate
+        displacement = (a00 * x + a01 * u + b0 * hx, a00 * y + a01 * v + b0 * hy, a00 * z + a01 * w + b0 * hz)
+        rate = (a10 * x + a11 * u + b1 * hx, a10 * y + a11 * v + b1 * hy, a10 * z + a11 * w + b1 * hz)
+        stepped.append(LinkState(displacement, rate))
+    return tuple(stepped)

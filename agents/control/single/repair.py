@@ -6,13 +6,13 @@ takes over, and gives back, step by step within a second; who returns has to be 
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 from attrs import frozen
+from msgspec import Struct
 
 from agents.control import modes
 from agents.control.hand import MappedHand
-from agents.control.single.goals import Row, goal_of
+from agents.control.single.goals import Guide, Row, goal_of
 from agents.control.single.impedance import AT_REST, LinkState, step_links
 from agents.control.single.vectors import Vector, norm
 from shared.messages import Mode
@@ -46,27 +46,21 @@ class Kin:
     heights: tuple[float, ...] | None
 
 
-class Reference(NamedTuple):
-    """An ancestor as last heard.
+class Reference(Guide, frozen=True):
+    """An ancestor as last heard: its position (`paper`) or goal (`stable`), goal velocity and mode.
 
     Attributes:
-        point: Its position (`paper`) or goal (`stable`), m.
-        velocity: The rate of that, m/s.
-        goal_velocity: Its broadcast goal velocity, m/s.
-        mode: Its mode.
+        velocity: How fast its point moves, m/s.
         age: Time since its sample arrived, s.
         fresh: Whether the sample is newer than the one of the last step.
     """
 
-    point: Vector
     velocity: Vector
-    goal_velocity: Vector
-    mode: Mode
     age: float
     fresh: bool
 
 
-class StandIn(NamedTuple):
+class StandIn(Struct, frozen=True):
     """How far an ancestor has been replaced.
 
     Attributes:
@@ -80,32 +74,14 @@ class StandIn(NamedTuple):
     links: tuple[LinkState, ...]
 
 
-class Guide(NamedTuple):
-    """What a drone follows in the place of one ancestor.
-
-    Attributes:
-        point: Where it is, or should be, m.
-        velocity: Its goal velocity, m/s.
-        follows: Whether it follows the hand, or whoever stands behind it does.
-    """
-
-    point: Vector
-    velocity: Vector
-    follows: bool
-
-
-def nobody_gone(kin: Sequence[Kin]) -> tuple[StandIn, ...]:
-    """Returns the state in which every ancestor speaks for itself."""
-    return tuple(_absent(each) for each in kin)
-
-
-def _absent(kin: Kin) -> StandIn:
-    return StandIn(0.0, 0.0, (AT_REST,) * len(kin.row.links))
-
-
 def is_fit(reference: Reference | None) -> bool:
     """Says whether an ancestor is heard and part of the formation."""
     return reference is not None and reference.age <= REFERENCE_LOST and reference.mode in modes.GUIDED_MODES
+
+
+def is_gone(reference: Reference | None) -> bool:
+    """Says whether an ancestor needs a stand-in."""
+    return reference is None or reference.age > REFERENCE_LOST or reference.mode in LEAVING_MODES
 
 
 def replace_lost(
@@ -118,40 +94,42 @@ def replace_lost(
     """Advances every ancestor's stand-in by one step.
 
     Args:
-        stand_ins: Before, one per ancestor.
+        stand_ins: Before, one per ancestor; none while all speak for themselves.
         kin: The ancestors.
         heard: What is known of each; None where never heard.
         hand_velocity: Mapped hand velocity in the formation's frame, m/s.
         dt: Time since the last step, s.
     """
-    return tuple(
+    before = stand_ins or [_absent(each) for each in kin]
+    after = tuple(
         [
             _advance(stand_in, each, reference, hand_velocity, dt)
-            if stand_in.share > 0.0 or _is_gone(reference)
+            if stand_in.share > 0.0 or is_gone(reference)
             else stand_in
-            for stand_in, each, reference in zip(stand_ins, kin, heard, strict=True)
+            for stand_in, each, reference in zip(before, kin, heard, strict=True)
         ]
     )
+    return after if any(each.share for each in after) else ()
+
+
+def _absent(kin: Kin) -> StandIn:
+    return StandIn(0.0, 0.0, (AT_REST,) * len(kin.row.links))
 
 
 def _advance(
     stand_in: StandIn, kin: Kin, reference: Reference | None, hand_velocity: Vector, dt: float
 ) -> StandIn:
-    share, heard_for, links = stand_in
+    share, heard_for = stand_in.share, stand_in.heard_for
     heard_for = heard_for + dt if is_fit(reference) else 0.0
     if reference is None:
         share = 1.0  # nothing to blend from: it was never there
-    elif _is_gone(reference) or heard_for < RETURN_AFTER:
+    elif is_gone(reference) or heard_for < RETURN_AFTER:
         share = min(share + dt / BLEND, 1.0)
     else:
         share -= dt / BLEND
     if share <= 0.0:
         return _absent(kin)
-    return StandIn(share, heard_for, step_links(links, kin.row.links, hand_velocity, dt))
-
-
-def _is_gone(reference: Reference | None) -> bool:
-    return reference is None or reference.age > REFERENCE_LOST or reference.mode in LEAVING_MODES
+    return StandIn(share, heard_for, step_links(stand_in.links, kin.row.links, hand_velocity, dt))
 
 
 def guides(
@@ -173,8 +151,6 @@ def guides(
     Returns:
         None in the place of an ancestor that is neither fit nor replaced: it has not joined yet.
     """
-    if not any(stand_in.share for stand_in in stand_ins):
-        return [guide_of(reference) for reference in heard[:wanted]]
     known: dict[int, Guide | None] = {}
     return [_guide(place, stand_ins, kin, heard, hand, known) for place in range(wanted)]
 
@@ -203,7 +179,9 @@ def guide_of(reference: Reference | None) -> Guide | None:
 
 
 def _own(reference: Reference) -> Guide:
-    return Guide(extrapolated(reference), reference.goal_velocity, reference.mode is Mode.FOLLOW)
+    if reference.fresh:
+        return reference
+    return Guide(_extrapolated(reference), reference.goal_velocity, reference.mode)
 
 
 def _stand_in(
@@ -213,9 +191,9 @@ def _stand_in(
     present = [guide for guide in behind if guide is not None]
     if len(present) < len(behind):
         return None
-    points, velocities = [guide.point for guide in present], [guide.velocity for guide in present]
-    point, velocity = goal_of(kin.row, links, hand, points, velocities, kin.heights)
-    return Guide(point, velocity, all(guide.follows for guide in present))
+    point, velocity = goal_of(kin.row, links, hand, present, kin.heights)
+    follows = all(guide.mode is Mode.FOLLOW for guide in present)
+    return Guide(point, velocity, Mode.FOLLOW if follows else Mode.HOLD)
 
 
 def _blend(own: Guide | None, stand_in: Guide | None, share: float) -> Guide | None:
@@ -223,8 +201,8 @@ def _blend(own: Guide | None, stand_in: Guide | None, share: float) -> Guide | N
         return stand_in
     return Guide(
         _between(own.point, stand_in.point, share),
-        _between(own.velocity, stand_in.velocity, share),
-        stand_in.follows,
+        _between(own.goal_velocity, stand_in.goal_velocity, share),
+        stand_in.mode,
     )
 
 
@@ -233,10 +211,8 @@ def _between(a: Vector, b: Vector, share: float) -> Vector:
     return (x + share * (u - x), y + share * (v - y), z + share * (w - z))
 
 
-def extrapolated(reference: Reference) -> Vector:
+def _extrapolated(reference: Reference) -> Vector:
     """Returns where a silent reference would be by now, at most 0.25 m from where it was last."""
-    if reference.fresh:
-        return reference.point
     speed = norm(reference.velocity)
     seconds = min(reference.age, EXTRAPOLATION / speed) if speed > 0.0 else 0.0
     (x, y, z), (u, v, w) = reference.point, reference.velocity

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from attrs import evolve, frozen
+from msgspec import Struct
 
 from agents.control.avoidance import COLUMN_BUBBLE, DRONE_BUBBLE, HAND_BUBBLE
 from agents.control.projection import project_swept
@@ -13,7 +13,14 @@ from agents.control.single import avoidance
 from agents.control.single.avoidance import Encounter
 from agents.control.single.trajectory import Trajectory, advance, approach, tracking_velocity
 from agents.control.single.vectors import Planar, Vector, clamp, shorten
-from agents.control.steering import ESCAPE_ACCELERATION, HAND_SPEED_FACTOR, LONGEST_STEP, ON_GOAL, ROUNDS
+from agents.control.steering import (
+    ESCAPE_ACCELERATION,
+    HAND_SPEED_FACTOR,
+    LONGEST_STEP,
+    ON_GOAL,
+    ROUNDS,
+    SHORTEST_STEP,
+)
 from shared.scenario import Avoidance, Limits
 
 
@@ -42,7 +49,7 @@ class SteeringSettings:
     lead_above: float
 
 
-class Bystander(NamedTuple):
+class Bystander(Struct, frozen=True):
     """A body that nobody hears: it may be anywhere near, at any height.
 
     Attributes:
@@ -56,7 +63,7 @@ class Bystander(NamedTuple):
     radius: float
 
 
-class Surroundings(NamedTuple):
+class Surroundings(Struct, frozen=True):
     """The body that is steered, and who is around.
 
     Attributes:
@@ -76,7 +83,7 @@ class Surroundings(NamedTuple):
     silent: Sequence[Bystander] = ()
 
 
-class Steered(NamedTuple):
+class Steered(Struct, frozen=True):
     """Result of one step.
 
     Attributes:
@@ -114,27 +121,29 @@ def steer(
         The reference and the set-point after the step, inside the fence and the limits.
     """
     limits, low, high = settings.limits, settings.low, settings.high
-    dt = min(max(dt, 1e-4), LONGEST_STEP)
+    dt = SHORTEST_STEP if dt < SHORTEST_STEP else LONGEST_STEP if dt > LONGEST_STEP else dt
     inside = clamp(goal, low, high)
     wanted, column_near = _towards(trajectory, inside, settings, dt)
     pu, pv = _keep_off(wanted, trajectory, around, settings)
     escaping = pu * pu + pv * pv > 0.0
     acceleration = limits.acceleration * (ESCAPE_ACCELERATION if escaping else 1.0)
-    speed = max(limits.speed, HAND_SPEED_FACTOR * around.hand_speed)
+    chasing = HAND_SPEED_FACTOR * around.hand_speed
+    speed = chasing if chasing > limits.speed else limits.speed
     u, v, w = wanted
-    moved = advance(trajectory, inside, (u + pu, v + pv, w), dt, speed, acceleration)
-    point = clamp(moved.point, low, high)
+    reached, velocity = advance(trajectory, (u + pu, v + pv, w), dt, speed, acceleration)
+    point = clamp(reached, low, high)
     avoiding = escaping or column_near
-    wish = moved.velocity if avoiding or not _on_goal(moved) else shorten(goal_velocity, speed)
-    share = _lead_share(escaping, around.hand_speed, settings)
+    on_goal = math.dist(reached, inside) < ON_GOAL
+    wish = shorten(goal_velocity, speed) if on_goal and not avoiding else velocity
+    share = 1.0 if escaping or settings.always_lead else _lead_share(around.hand_speed, settings.lead_above)
     a, b, c = wish
     lead = approach(trajectory.lead, (share * a, share * b, share * c), acceleration * dt)
     tau, (x, y, z), (a, b, c) = settings.tau, point, lead
     return Steered(
-        Trajectory(point, moved.velocity, lead, inside),
+        Trajectory(point, velocity, lead, inside),
         clamp((x + tau * a, y + tau * b, z + tau * c), low, high),
         avoiding,
-        inside != goal or point != moved.point,
+        inside != goal or point != reached,
     )
 
 
@@ -152,7 +161,7 @@ def _towards(
             x, y, z = trajectory.point
             return ((a - x) / dt, (b - y) / dt, (goal[2] - z) / dt), True
         return free, False
-    (u, v), near = avoidance.column_velocity(trajectory.point[:2], goal[:2], columns, rules.columns, rules.xi)
+    (u, v), near = avoidance.column_velocity(trajectory.point, goal, columns, rules.columns, rules.xi)
     return (shorten((u, v, free[2]), rules.speed), True) if near else (free, False)
 
 
@@ -177,27 +186,25 @@ def _keep_off(
     Each only adds what the others left missing; further rounds settle between those that disagree. Columns,
     which never give way, have the last word.
     """
-    point, moving = trajectory.point[:2], trajectory.velocity[:2]
-    body, flying = around.position[:2], around.velocity[:2]
-    field = settings.avoidance.separation
+    point, body, flying = trajectory.point, around.position, around.velocity
     pressing = [avoidance.threats(body, flying, around.drones, DRONE_BUBBLE)]
-    for x, y, radius in around.silent:
-        wider = evolve(DRONE_BUBBLE, radius=radius)
-        pressing.append(avoidance.threats(body, flying, [(x, y, 0.0, 0.0)], wider))
-    u, v = avoidance.separation(point, around.drones, field)
+    for silent in around.silent:
+        wider = evolve(DRONE_BUBBLE, radius=silent.radius)
+        pressing.append(avoidance.threats(body, flying, [(silent.x, silent.y, 0.0, 0.0)], wider))
+    others = around.drones
     if around.hand is not None:
-        hand = (around.hand,)
-        pressing.append(avoidance.threats(point, moving, hand, HAND_BUBBLE))
+        hand, others = (around.hand,), (*around.drones, around.hand)
+        pressing.append(avoidance.threats(point, trajectory.velocity, hand, HAND_BUBBLE))
         pressing.append(avoidance.threats(body, flying, hand, HAND_BUBBLE))
-        a, b = avoidance.separation(point, hand, field)
-        u, v = u + a, v + b
+    u, v = avoidance.separation(point, others, settings.avoidance.separation)
     if settings.columns:
         columns = avoidance.columns_near(body, flying, settings.columns, COLUMN_BUBBLE)
         pressing.append(avoidance.threats(body, flying, columns, COLUMN_BUBBLE))
-    pressing = [each for each in pressing if each]
-    for _ in range(ROUNDS if pressing else 0):
+    if not any(pressing):
+        return (u, v)
+    for _ in range(ROUNDS):
         before = (u, v)
-        for each in pressing:
+        for each in filter(None, pressing):
             a, b = avoidance.escape((wanted[0] + u, wanted[1] + v), each)
             u, v = u + a, v + b
         if (u, v) == before:
@@ -205,13 +212,7 @@ def _keep_off(
     return (u, v)
 
 
-def _on_goal(trajectory: Trajectory) -> bool:
-    return math.dist(trajectory.point, trajectory.goal) < ON_GOAL
-
-
-def _lead_share(escaping: bool, hand_speed: float, settings: SteeringSettings) -> float:
-    """Returns how much of the lead is used: all under `stable`, what safety needs under `paper`."""
-    if settings.always_lead or escaping:
-        return 1.0
-    excess = (hand_speed - settings.lead_above) / (0.25 * settings.lead_above)
+def _lead_share(hand_speed: float, lead_above: float) -> float:
+    """Returns how much of the lead is used under `paper`: what safety needs."""
+    excess = (hand_speed - lead_above) / (0.25 * lead_above)
     return min(max(excess, 0.0), 1.0)

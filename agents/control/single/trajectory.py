@@ -1,13 +1,14 @@
 """The reference trajectory of one drone, see `agents.control.trajectory`."""
 
 import math
-from typing import NamedTuple
+
+from msgspec import Struct
 
 from agents.control.single.vectors import ORIGIN, Vector, shorten
 from agents.control.trajectory import BRAKING_SHARE
 
 
-class Trajectory(NamedTuple):
+class Trajectory(Struct, frozen=True):
     """Reference of one drone.
 
     Attributes:
@@ -44,31 +45,37 @@ def tracking_velocity(trajectory: Trajectory, goal: Vector, dt: float, accelerat
     distance = math.hypot(ex, ey, ez)
     if distance == 0.0:
         return ((gx - x) / dt, (gy - y) / dt, (gz - z) / dt)
-    closing = min(distance / dt, math.sqrt(2.0 * BRAKING_SHARE * acceleration * distance))
-    share = closing / max(distance, 1e-12)
+    at_once, braked = distance / dt, math.sqrt(2.0 * BRAKING_SHARE * acceleration * distance)
+    share = (at_once if at_once < braked else braked) / (distance if distance > 1e-12 else 1e-12)
     return ((gx - x) / dt + ex * share, (gy - y) / dt + ey * share, (gz - z) / dt + ez * share)
 
 
 def advance(
-    trajectory: Trajectory, goal: Vector, wanted: Vector, dt: float, speed: float, acceleration: float
-) -> Trajectory:
+    trajectory: Trajectory, wanted: Vector, dt: float, speed: float, acceleration: float
+) -> tuple[Vector, Vector]:
     """Moves the reference with the wanted velocity as far as the limits allow.
 
     Args:
         trajectory: Reference before the step.
-        goal: Goal of this step, m.
         wanted: Wanted velocity, m/s.
         dt: Step, s.
         speed: Limit, m/s.
         acceleration: Limit, m/s^2.
+
+    Returns:
+        Its point and velocity after the step.
     """
     u, v, w = velocity = approach(trajectory.velocity, shorten(wanted, speed), acceleration * dt)
     x, y, z = trajectory.point
-    return Trajectory((x + u * dt, y + v * dt, z + w * dt), velocity, trajectory.lead, goal)
+    return (x + u * dt, y + v * dt, z + w * dt), velocity
 
 
 def approach(velocity: Vector, wanted: Vector, largest: float) -> Vector:
     """Changes a velocity towards a wanted one by at most `largest`, m/s."""
     (u, v, w), (a, b, c) = velocity, wanted
-    du, dv, dw = shorten((a - u, b - v, c - w), largest)
+    du, dv, dw = a - u, b - v, c - w
+    change = math.hypot(du, dv, dw)
+    if change > largest:
+        share = largest / change
+        return (u + du * share, v + dv * share, w + dw * share)
     return (u + du, v + dv, w + dw)

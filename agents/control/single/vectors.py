@@ -19,7 +19,8 @@ def vector(numbers: Iterable[float]) -> Vector:
 
 def norm(vector: Vector) -> float:
     """Returns the length."""
-    return math.hypot(*vector)
+    x, y, z = vector
+    return math.hypot(x, y, z)
 
 
 def shorten(vector: Vector, largest: float) -> Vector:

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from agents.vehicles.bodies import crazyflie, identified
 from agents.vehicles.bodies.single import crazyflie as one_crazyflie
 from agents.vehicles.bodies.single import identified as one_identified
-from agents.vehicles.bodies.single.state import OneStep, apart, together
+from agents.vehicles.bodies.single.state import Body, Fly, apart, together
 from agents.vehicles.bodies.state import BodyState, Commands
+from shared.messages import Vector
 
 Step = Callable[[BodyState, Commands, float], BodyState]
 
@@ -20,11 +21,11 @@ FEW = 16
 BODIES: dict[str, Step] = {"identified": identified.step, "crazyflie": crazyflie.step}
 """Body type of a scenario (`vehicles.*.body`) -> its step."""
 
-ONE_BY_ONE: dict[Step, OneStep] = {
-    identified.step: one_identified.step,
-    crazyflie.step: one_crazyflie.step,
+ONE_BY_ONE: dict[Step, Fly] = {
+    identified.step: one_identified.fly,
+    crazyflie.step: one_crazyflie.fly,
 }
-"""The same step for one body in plain floats."""
+"""The same for one body in plain floats."""
 
 
 def advance(step: Step, state: BodyState, commands: Commands, duration: float) -> BodyState:
@@ -36,21 +37,31 @@ def advance(step: Step, state: BodyState, commands: Commands, duration: float) -
         commands: One per body.
         duration: s, >= 0; cut into equal substeps of at most `SUBSTEP`.
     """
-    # The tolerance keeps 0.012 s, which is not three times 0.004 in floating point, at three substeps.
-    substeps = math.ceil(duration / SUBSTEP - 1e-9)
     if len(state.thrust) <= FEW:
-        return _one_by_one(ONE_BY_ONE[step], state, commands, duration, substeps)
+        fly = ONE_BY_ONE[step]
+        orders = zip(apart(state), commands.kind.tolist(), commands.setpoint.tolist(), strict=True)
+        return together([advance_one(fly, body, kind, setpoint, duration) for body, kind, setpoint in orders])
+    substeps = substeps_of(duration)
     for _ in range(substeps):
         state = step(state, commands, duration / substeps)
     return state
 
 
-def _one_by_one(
-    step: OneStep, state: BodyState, commands: Commands, duration: float, substeps: int
-) -> BodyState:
-    bodies = apart(state)
-    orders = zip(commands.kind.tolist(), commands.setpoint.tolist(), strict=True)
-    for row, (kind, setpoint) in enumerate(orders):
-        for _ in range(substeps):
-            bodies[row] = step(bodies[row], kind, setpoint, duration / substeps)
-    return together(bodies)
+def advance_one(fly: Fly, body: Body, kind: int, setpoint: Vector, duration: float) -> Body:
+    """Advances one body with its command held.
+
+    Args:
+        fly: One of `ONE_BY_ONE`.
+        body: Before.
+        kind: Value of a `Command`.
+        setpoint: m.
+        duration: As for `advance`.
+    """
+    substeps = substeps_of(duration)
+    return fly(body, kind, setpoint, duration / max(substeps, 1), substeps)
+
+
+def substeps_of(duration: float) -> int:
+    """Returns into how many substeps a duration, s, is cut."""
+    # The tolerance keeps 0.012 s, which is not three times 0.004 in floating point, at three substeps.
+    return math.ceil(duration / SUBSTEP - 1e-9)

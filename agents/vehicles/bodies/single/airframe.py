@@ -1,35 +1,44 @@
-"""Motors, motion and ground of one body, see `agents.vehicles.bodies.airframe`."""
+"""Motion and ground of one body, see `agents.vehicles.bodies.airframe`."""
 
-import math
+from agents.vehicles.bodies.airframe import DRAG, GRAVITY, MASS
 
-from agents.vehicles.bodies.airframe import DRAG, GRAVITY, MASS, MOTOR_LAG, thrust_of
-from agents.vehicles.bodies.single.state import Planar
-from shared.messages import ORIGIN, Vector
+Motion = tuple[float, float, float, float, float, float]
+"""Position x, y, z, m, and velocity u, v, w, m/s, in the world frame."""
 
 
 def move(
-    position: Vector, velocity: Vector, thrust: float, pwm: float, horizontal: Planar, dt: float
-) -> tuple[Vector, Vector, float]:
-    """Integrates thrust, velocity and position over one substep; the ground stops whatever reaches it.
+    x: float,
+    y: float,
+    z: float,
+    u: float,
+    v: float,
+    w: float,
+    along_x: float,
+    along_y: float,
+    thrust: float,
+    dt: float,
+) -> Motion:
+    """Integrates velocity and position over one substep; the ground stops whatever reaches it.
 
     Args:
-        position: World frame, m.
-        velocity: World frame, m/s.
-        thrust: N.
-        pwm: Motor command of this substep.
-        horizontal: Mean acceleration over the substep, m/s^2.
+        x: Position, m.
+        y: The same.
+        z: The same.
+        u: Velocity along x, m/s.
+        v: Along y.
+        w: Along z.
+        along_x: Mean acceleration over the substep, m/s^2.
+        along_y: The same.
+        thrust: Its mean, N.
         dt: Substep, s.
 
     Returns:
-        Position, velocity and thrust `dt` later.
+        Position and velocity `dt` later.
     """
-    (x, y, z), (u, v, w), (a, b) = position, velocity, horizontal
-    target = thrust_of(pwm)
-    later = target + (thrust - target) * math.exp(-dt / MOTOR_LAG)
-    c = (thrust + later) / (2.0 * MASS) - GRAVITY - DRAG * w
-    u1, v1, w1 = u + a * dt, v + b * dt, w + c * dt
+    u1, v1 = u + along_x * dt, v + along_y * dt
+    w1 = w + (thrust / MASS - GRAVITY - DRAG * w) * dt
     half = 0.5 * dt
     height = z + (w + w1) * half
     if height <= 0.0:
-        return (x, y, 0.0), ORIGIN, later
-    return (x + (u + u1) * half, y + (v + v1) * half, height), (u1, v1, w1), later
+        return x, y, 0.0, 0.0, 0.0, 0.0
+    return x + (u + u1) * half, y + (v + v1) * half, height, u1, v1, w1

@@ -1,6 +1,8 @@
 """One body fitted on the recorded flights, see `agents.vehicles.bodies.identified`."""
 
-from agents.vehicles.bodies.airframe import DRAG
+import math
+
+from agents.vehicles.bodies.airframe import DRAG, MOTOR_LAG, thrust_of
 from agents.vehicles.bodies.identified import (
     ACCELERATION_LIMIT,
     DAMPING,
@@ -8,35 +10,56 @@ from agents.vehicles.bodies.identified import (
     INTEGRAL_LIMIT,
     STIFFNESS,
 )
+from agents.vehicles.bodies.pid import PERIOD, ROUNDING
 from agents.vehicles.bodies.single.airframe import move
-from agents.vehicles.bodies.single.pid import VERTICAL, control
-from agents.vehicles.bodies.single.state import FLY, Body, clip
+from agents.vehicles.bodies.single.pid import X, Y, Z, control, open_loop
+from agents.vehicles.bodies.single.state import FLY, Body
 from shared.messages import Vector
 
 
-def step(body: Body, kind: int, setpoint: Vector, dt: float) -> Body:
-    """Advances one identified body by one substep.
+def fly(body: Body, kind: int, setpoint: Vector, dt: float, substeps: int) -> Body:
+    """Advances one identified body with its command held.
 
     Args:
         body: Before.
         kind: Value of a `Command`.
         setpoint: m.
         dt: Substep, s, at most the controller's 0.02.
+        substeps: How many.
     """
-    position, velocity, (a, b, c), _, _, tilt, tilt_rate, thrust, _ = body
-    (x, y, z), (u, v, _) = position, velocity
-    horizontal = (-DRAG * u, -DRAG * v)
-    if z <= 0.0:
-        a = b = 0.0
-    if kind == FLY:
-        ex, ey = setpoint[0] - x, setpoint[1] - y
-        if z > 0.0:
-            a = clip(a + ex * dt, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
-            b = clip(b + ey * dt, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
-        horizontal = (
-            clip(STIFFNESS * ex - DAMPING * u + INTEGRAL_GAIN * a, -ACCELERATION_LIMIT, ACCELERATION_LIMIT),
-            clip(STIFFNESS * ey - DAMPING * v + INTEGRAL_GAIN * b, -ACCELERATION_LIMIT, ACCELERATION_LIMIT),
-        )
-    integral, error, output, wait = control(body, (a, b, c), kind, setpoint, VERTICAL, dt)
-    position, velocity, thrust = move(position, velocity, thrust, output[2], horizontal, dt)
-    return Body(position, velocity, integral, error, output, tilt, tilt_rate, thrust, wait)
+    (x, y, z), (u, v, w), thrust, wait = body.position, body.velocity, body.thrust, body.wait
+    (a, b, c), (ex, ey, ez), pwm = body.integral, body.error, body.output[Z]
+    wanted_x, wanted_y, wanted_z = setpoint
+    flying = kind == FLY
+    steady, lag = thrust_of(pwm), math.exp(-dt / MOTOR_LAG)
+    for _ in range(substeps):
+        grounded = z <= 0.0
+        if grounded:
+            a = b = 0.0
+        if flying:
+            dx, dy = wanted_x - x, wanted_y - y
+            if not grounded:
+                a, b = a + dx * dt, b + dy * dt
+                if abs(a) > INTEGRAL_LIMIT:
+                    a = math.copysign(INTEGRAL_LIMIT, a)
+                if abs(b) > INTEGRAL_LIMIT:
+                    b = math.copysign(INTEGRAL_LIMIT, b)
+            along_x = STIFFNESS * dx - DAMPING * u + INTEGRAL_GAIN * a
+            along_y = STIFFNESS * dy - DAMPING * v + INTEGRAL_GAIN * b
+            if abs(along_x) > ACCELERATION_LIMIT:
+                along_x = math.copysign(ACCELERATION_LIMIT, along_x)
+            if abs(along_y) > ACCELERATION_LIMIT:
+                along_y = math.copysign(ACCELERATION_LIMIT, along_y)
+        else:
+            along_x, along_y = -DRAG * u, -DRAG * v
+        if wait <= ROUNDING:
+            pwm = open_loop(kind, pwm, grounded=grounded)
+            c, ez, pwm = control(Z, wanted_z - z, c, ez, pwm, flying=flying, grounded=grounded)
+            steady = thrust_of(pwm)
+            wait += PERIOD
+        wait -= dt
+        later = steady + (thrust - steady) * lag
+        x, y, z, u, v, w = move(x, y, z, u, v, w, along_x, along_y, 0.5 * (thrust + later), dt)
+        thrust = later
+    error, output = (ex, ey, ez), (body.output[X], body.output[Y], pwm)
+    return Body((x, y, z), (u, v, w), (a, b, c), error, output, body.tilt, body.tilt_rate, thrust, wait)

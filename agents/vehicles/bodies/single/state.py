@@ -1,9 +1,9 @@
 """One body, and the way from the rows of a `BodyState` and back; see `agents.vehicles.bodies.state`."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
+from msgspec import Struct, structs
 
 from agents.vehicles.bodies.state import BodyState, Command
 from shared.messages import Vector
@@ -14,7 +14,7 @@ Planar = tuple[float, float]
 FLY = Command.FLY.value
 
 
-class Body(NamedTuple):
+class Body(Struct, frozen=True):
     """One row of a `BodyState`: the same fields in the same order."""
 
     position: Vector
@@ -28,23 +28,19 @@ class Body(NamedTuple):
     wait: float
 
 
-OneStep = Callable[[Body, int, Vector, float], Body]
-"""Advances one body by one substep: body, kind of `Command`, set-point, substep."""
+Fly = Callable[[Body, int, Vector, float, int], Body]
+"""Advances one body with its command held: body, kind of `Command`, set-point, substep, number of substeps."""
 
 
 def apart(state: BodyState) -> list[Body]:
     """Returns the bodies, one per row."""
-    arrays, wait = state[:-1], state.wait
-    rows = zip(*(array.tolist() for array in arrays), strict=True)
-    return [Body._make((*numbers, wait)) for numbers in rows]
+    *vectors, thrust = state[:-1]
+    columns = [map(tuple, array.tolist()) for array in vectors]
+    rows = zip(*columns, thrust.tolist(), [state.wait] * len(thrust), strict=True)
+    return [Body(*row) for row in rows]
 
 
 def together(bodies: Sequence[Body]) -> BodyState:
     """Returns the rows of these bodies, whose controllers tick together."""
-    *columns, waits = zip(*bodies, strict=True)
+    *columns, waits = zip(*map(structs.astuple, bodies), strict=True)
     return BodyState._make((*map(np.array, columns), waits[0]))
-
-
-def clip(value: float, low: float, high: float) -> float:
-    """Returns the nearest number between `low` and `high`."""
-    return low if value < low else high if value > high else value
