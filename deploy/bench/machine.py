@@ -6,6 +6,9 @@ import resource
 from importlib.metadata import version
 from pathlib import Path
 
+SHORTEST_S = 0.1
+"""The kernel counts in hundredths of a second: within less time one of them would look like a busy core, s."""
+
 _STAT = Path("/proc/stat")
 _IDLE = (3, 4)
 _GUEST = 8
@@ -18,14 +21,15 @@ class Conditions:
         self._seconds, self._busy, self._own = _uptime(), _busy_s(), _own_s()
 
     def others_cores(self) -> float | None:
-        """Returns how many cores processes other than ours have kept busy since; None if it is not known.
+        """Returns how many cores processes other than ours have kept busy since; None if that cannot be told.
 
         Ours are this process and those of its children that have ended.
         """
-        if self._busy is None or (busy := _busy_s()) is None:
+        seconds = _uptime() - self._seconds
+        if self._busy is None or (busy := _busy_s()) is None or seconds < SHORTEST_S:
             return None
         others = busy - self._busy - (_own_s() - self._own)
-        return max(0.0, others) / max(_uptime() - self._seconds, 1e-6)
+        return max(0.0, others) / seconds
 
     def text(self) -> str:
         """Returns cores, system, versions and the load of others, in one line."""

@@ -158,12 +158,15 @@ def test_usage_grows_with_work_and_with_sleep() -> None:
 
 
 @needs_proc
-def test_conditions_say_how_busy_others_were() -> None:
+def test_conditions_say_how_busy_others_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("deploy.bench.machine._uptime", iter((100.0, 100.05, *[200.0] * 3)).__next__)
     conditions = Conditions()
+    assert conditions.others_cores() is None, "too short to tell"
     others = conditions.others_cores()
     assert others is not None
     assert 0.0 <= others <= (os.cpu_count() or 1) + 1.0
     assert "Zenoh" in conditions.text()
+    assert "other processes used" in conditions.text()
 
 
 def test_conditions_without_proc_leave_the_load_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
