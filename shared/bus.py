@@ -111,7 +111,7 @@ class ZenohBus:
         return declared.put
 
     def subscribe(self, key_expression: str, inbox: Inbox) -> None:
-        """See `Bus.subscribe`; the callback only stores bytes, decoding is the loop's work."""
+        """See `Bus.subscribe`; the callback stores bytes, what else it does is up to the inbox."""
         fixed = None if "*" in key_expression else key_expression
 
         def store(sample: zenoh.Sample) -> None:

@@ -65,7 +65,7 @@ def decode(payload: bytes, kind: type[M]) -> M:
 
 
 class _Envelope(msgspec.Struct):
-    """The one field that no message declares."""
+    """The version as a field that must be there: as the tag of a message msgspec does without it."""
 
     v: Annotated[int, msgspec.Meta(ge=SCHEMA_VERSION, le=SCHEMA_VERSION)]
 

@@ -18,8 +18,7 @@ from agents.vehicles.bodies.state import Command
 from deploy.lockstep.hand_track import track_hand
 from deploy.lockstep.record import Moment, Record, make_record
 from deploy.lockstep.start import rest_places, start_fleet
-from deploy.lockstep.ticks import tick_ns
-from shared.clock import NS_PER_S
+from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.codec import encode
 from shared.formation import Formation, Vec
 from shared.messages import DroneState, HandSample, Mode
@@ -81,7 +80,7 @@ class Lockstep:
             states[row] = self._agents[row].step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
             self._publish(self._keys[row], states[row], now)
         ordered = [states[row] for row in range(len(states))]
-        duration = (tick_ns(self.tick + 1, self._rate) - now) / NS_PER_S
+        duration = tick_length(self.tick, self._rate)
         self.flyers = [
             advance_flyer(self.flyers[row], _COMMANDS[state.mode], state.setpoint, duration)
             for row, state in enumerate(ordered)
