@@ -14,7 +14,7 @@ from deploy.bench.figures import spread
 from deploy.bench.flight_ear import FlightEar
 from deploy.bench.floor_ear import FloorEar
 from deploy.bench.report import Json, Report, Sheet
-from deploy.bench.swarm import Phase, fly, fly_bare_zenoh
+from deploy.bench.swarm import BenchError, Phase, fly, fly_bare_zenoh
 from observer.agent_log import AgentSummary
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
@@ -41,7 +41,7 @@ def measure(
     overrides: Sequence[str] = (),
     say: Callable[[str], None] = lambda _: None,
 ) -> Report:
-    """Measures swarms of several sizes.
+    """Measures swarms of several sizes; the first that cannot be measured ends the curve, and is named.
 
     Args:
         agents: The sizes.
@@ -53,16 +53,22 @@ def measure(
 
     Raises:
         ConfigError: The scenario is refused.
-        BenchError: Somebody ended or did not come.
+        BenchError: Somebody ended or did not come, in the first swarm.
     """
-    records = []
+    records: list[Json] = []
     for number in agents:
         settings = load_scenario(scenario, (*comb(number), *overrides))
         formation = build_formation(settings, scenario)
         turns = []
-        for turn in range(rounds):
-            say(f"{number} agents, round {turn + 1} of {rounds}")
-            turns.append(_take_turn(settings, formation, seconds / rounds))
+        try:
+            for turn in range(rounds):
+                say(f"{number} agents, round {turn + 1} of {rounds}")
+                turns.append(_take_turn(settings, formation, seconds / rounds))
+        except BenchError as error:
+            if not records:
+                raise
+            say(f"{number} agents: {error}; the curve ends before them")
+            break
         records.append(_record(settings, formation, turns))
     return Report(
         name="scale",

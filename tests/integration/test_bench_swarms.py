@@ -16,7 +16,8 @@ from deploy.bench.hop import HAND_ID
 from deploy.bench.swarm import BenchError, fly, fly_bare_udp, fly_bare_zenoh
 from deploy.launcher.process_table import ProcessRow
 from shared.config import load_scenario
-from shared.formation import build_formation
+from shared.formation import Formation, build_formation
+from shared.scenario import Scenario
 from shared.signature import SIGNATURE_BYTES
 
 pytestmark = [
@@ -98,8 +99,18 @@ def test_chain_with_keys_says_what_they_cost_and_keeps_none() -> None:
     assert record["verify_us"] > 0.0
 
 
-def test_scale_keeps_its_contract() -> None:
-    report = scale.measure(agents=[3], seconds=1.5, rounds=1, overrides=[QUICK_TAKEOFF])
+def test_scale_keeps_its_contract_and_what_it_measured_before_a_size_that_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fly_up_to_three(scenario: Scenario, formation: Formation, seconds: float) -> Any:
+        if len(formation.ids) > 3:
+            raise BenchError("not everybody was there")
+        return fly(scenario, formation, seconds)
+
+    monkeypatch.setattr(scale, "fly", fly_up_to_three)
+    said: list[str] = []
+    report = scale.measure(agents=[3, 4, 5], seconds=1.5, rounds=1, overrides=[QUICK_TAKEOFF], say=said.append)
+    assert said[-1] == "4 agents: not everybody was there; the curve ends before them"
     (record,) = report.records
     assert {
         *("agents", "seconds", "on_time", "rate_hz", "cpu_cores", "cpu_per_agent_ratio", "rss_mb"),
@@ -110,6 +121,8 @@ def test_scale_keeps_its_contract() -> None:
     assert 0.0 < record["on_time_worst"] <= record["on_time"] <= 1.0
     assert record["cpu_cores"] > 3 * record["cpu_per_agent"] > 0.0
     assert record["rss_mb"] > 10.0
+    with pytest.raises(BenchError):
+        scale.measure(agents=[4, 3], seconds=1.5, rounds=1)
 
 
 def test_record_keeps_its_contract_and_reads_its_trace() -> None:

@@ -2,7 +2,7 @@
 
 import math
 
-from agents.vehicles.bodies.airframe import DRAG, MOTOR_LAG, thrust_of
+from agents.vehicles.bodies.airframe import DRAG, GRAVITY, MASS, MOTOR_LAG, thrust_of
 from agents.vehicles.bodies.identified import (
     ACCELERATION_LIMIT,
     DAMPING,
@@ -11,7 +11,6 @@ from agents.vehicles.bodies.identified import (
     STIFFNESS,
 )
 from agents.vehicles.bodies.pid import PERIOD, ROUNDING
-from agents.vehicles.bodies.single.airframe import move
 from agents.vehicles.bodies.single.pid import X, Y, Z, control, open_loop
 from agents.vehicles.bodies.single.state import FLY, Body
 from shared.messages import Vector
@@ -31,7 +30,7 @@ def fly(body: Body, kind: int, setpoint: Vector, dt: float, substeps: int) -> Bo
     (a, b, c), (ex, ey, ez), pwm = body.integral, body.error, body.output[Z]
     wanted_x, wanted_y, wanted_z = setpoint
     flying = kind == FLY
-    steady, lag = thrust_of(pwm), math.exp(-dt / MOTOR_LAG)
+    half, steady, lag = 0.5 * dt, thrust_of(pwm), math.exp(-dt / MOTOR_LAG)
     for _ in range(substeps):
         grounded = z <= 0.0
         if grounded:
@@ -59,7 +58,14 @@ def fly(body: Body, kind: int, setpoint: Vector, dt: float, substeps: int) -> Bo
             wait += PERIOD
         wait -= dt
         later = steady + (thrust - steady) * lag
-        x, y, z, u, v, w = move(x, y, z, u, v, w, along_x, along_y, 0.5 * (thrust + later), dt)
+        # As `move` in single/airframe.py does it: calling that takes 1.5 % of all the time of a small swarm.
+        u1, v1 = u + along_x * dt, v + along_y * dt
+        w1 = w + (0.5 * (thrust + later) / MASS - GRAVITY - DRAG * w) * dt
+        height = z + (w + w1) * half
+        if height <= 0.0:
+            z = u = v = w = 0.0
+        else:
+            x, y, z, u, v, w = x + (u + u1) * half, y + (v + v1) * half, height, u1, v1, w1
         thrust = later
     error, output = (ex, ey, ez), (body.output[X], body.output[Y], pwm)
     return Body((x, y, z), (u, v, w), (a, b, c), error, output, body.tilt, body.tilt_rate, thrust, wait)
