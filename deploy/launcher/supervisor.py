@@ -141,9 +141,11 @@ class Supervisor:
 
 
 def _signal(child: Child, number: signal.Signals) -> None:
-    if child.process is not None:
+    process = child.process
+    if process is not None and process.returncode is None:
+        # Its own `send_signal` would reap one that has just ended: asyncio would miss the exit code and say so.
         with suppress(ProcessLookupError):
-            child.process.send_signal(number)
+            os.kill(process.pid, number)
 
 
 def _write(child: Child, lines: list[str]) -> None:
