@@ -123,7 +123,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.chaos.soak", description=__doc__)
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--drones", type=int, default=8)
-    parser.add_argument("--hz", type=float, default=60.0, help="rate of hand and control, for a slow machine")
     parser.add_argument(
         "--links", choices=("tcp", "udp"), default="tcp", help="docs/chaos.md has their weather"
     )
@@ -131,13 +130,12 @@ def main() -> int:
     if reason := obstacle():
         print(f"soak: {reason}", file=sys.stderr)
         return 2
-    rates = [f"rates.{name}={arguments.hz}" for name in ("control_hz", "hand_hz")]
     with chaos_flight(
         Path(tempfile.mkdtemp(prefix="soak-")),
         "scripted:tour?peak=0.3",
         "grid",
         protocol=arguments.links,
-        overrides=[f"formation.n={arguments.drones}", *rates],
+        overrides=[f"formation.n={arguments.drones}"],
     ) as flight:
         faulty = soak(flight, 60.0 * arguments.minutes)
     left = [space.name for space in Path("/run/netns").glob(f"{PREFIX}*")]
