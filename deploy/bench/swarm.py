@@ -31,7 +31,8 @@ HAND = "scripted:tour"
 WARM_UP_S = 1.0
 """From the moment everybody is at work to the first sample that counts, s."""
 READY_S = 12.0
-"""A swarm has this long, and as long again per `READY_DRONES` drones, to come to work, s."""
+"""Those that start at the same time, and then the swarm as a whole, have this long to come to work, and as long
+again per `READY_DRONES` drones of the swarm, s."""
 READY_DRONES = 16
 AT_ONCE = 8
 """So many processes start at the same time: more would starve each other's links until they count as dead."""

@@ -170,8 +170,8 @@ def warm_up(flight: ChaosFlight, chance: random.Random, back: dict[str, list[flo
     flight.recorder.listen(WARM_UP_S)
     cold = holdings(flight)
     for _ in range(WARM_UP_ROUNDS):
-        for kind in range(len(faults(flight, chance))):
-            suffer(flight, faults(flight, chance)[kind], back)
+        for fault in faults(flight, chance):
+            suffer(flight, fault, back)
     return cold
 
 
@@ -185,10 +185,14 @@ def suffer(flight: ChaosFlight, fault: Fault, back: dict[str, list[float]]) -> N
     flight.recorder.forget(CALM_S)
 
 
+def survivors(flight: ChaosFlight, pids: dict[str, int]) -> list[str]:
+    """Returns the processes that are still those of `pids`: they were never killed."""
+    return [token for token, pid in sorted(pids.items()) if flight.processes[token].pid == pid]
+
+
 def memory(flight: ChaosFlight, pids: dict[str, int]) -> str:
     """Says what every process that was never killed holds now, own and resident: a point of its curve."""
-    alive = [token for token, pid in sorted(pids.items()) if flight.processes[token].pid == pid]
-    held = {token: _held(pids[token]) for token in alive}
+    held = {token: _held(pids[token]) for token in survivors(flight, pids)}
     return ", ".join(f"{token} {one.own_mb:.2f} of {one.rss_mb:.2f}" for token, one in held.items()) + " MB"
 
 
@@ -208,9 +212,7 @@ def grown(
     wrong = False
     flight.recorder.listen(SETTLE_S)
     after = holdings(flight)
-    for token in sorted(before):
-        if flight.processes[token].pid != pids[token]:
-            continue
+    for token in survivors(flight, pids):
         one, other = before[token], after[token]
         own, resident = other.own_mb / one.own_mb - 1.0, other.rss_mb / one.rss_mb - 1.0
         print(f"{token}: own {own:+.1%}, resident {resident:+.1%}: {cold[token]} -> {one} -> {other}")
