@@ -1,0 +1,126 @@
+"""Whether something can have moved as it is said to have. Pure: time is passed in.
+
+A body, or a hand, moves at a bounded speed. Whoever claims more is mistaken or lies, and is not believed until
+the time that has passed would have been enough. A claim that is kept up is believed in the end, so a body that
+was carried, fell, started anew elsewhere or was not heard for a while is never refused for good.
+
+How far something may have come is a budget: it grows with the time that passed on the *receiver's* clock and is
+spent by moving, so many small jumps get nobody further than one large one. Stamps of the sender grant nothing.
+"""
+
+import math
+
+from msgspec import Struct
+
+from shared.clock import NS_PER_S
+from shared.errors import DecodeError
+from shared.messages import Vector
+
+UNBOUNDED: Vector = (math.inf, math.inf, math.inf)
+
+BODY_SPEED, FALL_SPEED = 5.0, 10.0
+"""A small drone that is blown away or falls indoors is no faster, m/s."""
+MARGIN = 4.0
+"""Nor is one that follows: it overshoots, and goes faster where it has to catch up or to escape."""
+BEYOND_FENCE = 2.0
+"""How far out of the fence a body may get, m: it may be pushed, carried or badly tracked."""
+
+
+class MotionLimits(Struct, frozen=True, kw_only=True):
+    """What is possible.
+
+    Attributes:
+        speed: Largest horizontal speed, m/s.
+        vertical_speed: Largest vertical speed, m/s; a body falls faster than it flies.
+        slack: How far one may seem to move at once, m: noise, and samples that were held up and came together.
+        low: Lower corner of where it can be, m.
+        high: Upper corner, m.
+    """
+
+    speed: float
+    vertical_speed: float
+    slack: float
+    low: Vector = (-math.inf, -math.inf, -math.inf)
+    high: Vector = UNBOUNDED
+
+
+HAND_LIMITS = MotionLimits(speed=10.0, vertical_speed=10.0, slack=0.3)
+"""No reach of an arm is faster. Where a hand may be is up to the mapping, which clamps it."""
+
+
+def body_limits(low: Vector, high: Vector, fastest: float) -> MotionLimits:
+    """Returns what is possible for the body of a drone.
+
+    Args:
+        low: Lower corner of the fence, m.
+        high: Upper corner, m.
+        fastest: Largest speed that anybody may be asked to fly at, m/s.
+    """
+    (a, b, c), (d, e, f) = low, high
+    return MotionLimits(
+        speed=max(BODY_SPEED, MARGIN * fastest),
+        vertical_speed=max(FALL_SPEED, MARGIN * fastest),
+        slack=0.5,
+        low=(a - BEYOND_FENCE, b - BEYOND_FENCE, c - BEYOND_FENCE),
+        high=(d + BEYOND_FENCE, e + BEYOND_FENCE, f + BEYOND_FENCE),
+    )
+
+
+class Believed(Struct, frozen=True):
+    """What was believed last.
+
+    Attributes:
+        position: m.
+        at_ns: When, on the receiver's clock (of a source that has good stamps: on its clock).
+        reach: What is left of the slack, m.
+    """
+
+    position: Vector
+    at_ns: int
+    reach: float
+
+
+def believe(
+    known: Believed | None, position: Vector, velocity: Vector, at_ns: int, limits: MotionLimits
+) -> Believed:
+    """Believes a position and a velocity, or refuses them.
+
+    Args:
+        known: What was believed last; None before the first, which may be anywhere within the limits.
+        position: What is said now, m.
+        velocity: The same, m/s.
+        at_ns: When, on the clock of `known`.
+        limits: What is possible.
+
+    Returns:
+        What to keep for the next call.
+
+    Raises:
+        DecodeError: `outside` (not within the limits), `too-fast` (the velocity) or `jump` (it cannot have come
+            there from where it was). Keep `known`: the next claim is judged by it, with more time passed.
+    """
+    x, y, z = position
+    (a, b, c), (d, e, f) = limits.low, limits.high
+    if not (a <= x <= d and b <= y <= e and c <= z <= f):
+        raise DecodeError(
+            "outside", f"at {_said(position)} m, not within {_said(limits.low)} to {_said(limits.high)}"
+        )
+    u, v, w = velocity
+    squash = limits.speed / limits.vertical_speed
+    if not math.hypot(u, v, w * squash) <= limits.speed:
+        raise DecodeError("too-fast", f"{_said(velocity)} m/s")
+    if known is None:
+        return Believed(position, at_ns, limits.slack)
+    p, q, r = known.position
+    way = math.hypot(x - p, y - q, (z - r) * squash)
+    passed = at_ns - known.at_ns
+    reach = known.reach + limits.speed * passed / NS_PER_S if passed > 0 else known.reach
+    if not way <= reach:
+        raise DecodeError(
+            "jump", f"from {_said(known.position)} to {_said(position)} m within {passed / NS_PER_S:.3f} s"
+        )
+    return Believed(position, at_ns, min(reach - way, limits.slack))
+
+
+def _said(vector: Vector) -> str:
+    return "({:.2f}, {:.2f}, {:.2f})".format(*vector)
