@@ -14,17 +14,17 @@ import numpy as np
 from human_relay.sources.base import HandPose
 from human_relay.sources.playback import PERIOD_NS, Playback
 from shared.clock import NS_PER_S
-from shared.csv_table import Stamps, Vec, read_rows, read_table
 from shared.errors import ConfigError
-from shared.flight_folder import (
+from shared.messages import Wish
+from shared.recordings.csv_table import read_rows, read_table
+from shared.recordings.flight_folder import (
     HAND_FILE,
-    Track,
     check_increasing,
     read_meta,
     read_obstacles,
     read_track,
 )
-from shared.messages import Wish
+from shared.recordings.track import Stamps, Track, Vec
 from shared.uri import Uri
 
 BAG_TOPIC = "/vicon/glove/glove"
@@ -87,7 +87,7 @@ def read_recording(path: Path, topic: str = BAG_TOPIC) -> Track:
     if path.is_dir():
         return read_track(path / HAND_FILE)
     if path.suffix == ".bag":
-        from shared.ros_bag import read_bag  # noqa: PLC0415  rosbags is an optional extra
+        from shared.recordings.ros_bag import read_bag  # noqa: PLC0415  rosbags is an optional extra
 
         return read_bag(path, topic)
     return read_csv(path)

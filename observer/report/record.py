@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from attrs import frozen
 
-from shared.csv_table import Vec
 from shared.formation import Formation
+from shared.recordings.track import Vec
 from shared.scenario import Hand, Obstacle
 
 ROW_HZ = 60.0

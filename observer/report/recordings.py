@@ -14,12 +14,11 @@ from scipy.signal import savgol_filter
 
 from observer.report.record import ROW_HZ, FlightRecord, Played, hold, mapped_hand, resample
 from shared.clock import NS_PER_S
-from shared.csv_table import Stamps, Vec
 from shared.errors import ConfigError
-from shared.flight_folder import (
+from shared.formation import build_formation
+from shared.recordings.flight_folder import (
     HAND_FILE,
     Setpoints,
-    Track,
     read_arrivals,
     read_meta,
     read_obstacles,
@@ -27,8 +26,8 @@ from shared.flight_folder import (
     read_setpoints,
     read_track,
 )
-from shared.formation import build_formation
-from shared.ros_bag import BagTrack, read_bag_tracks
+from shared.recordings.ros_bag import BagTrack, read_bag_tracks
+from shared.recordings.track import Stamps, Track, Vec
 from shared.scenario import Clip, FormationSettings, Hand, Obstacle, Scenario
 
 DRONES = (1, 2, 3)
@@ -65,7 +64,7 @@ class _Recording:
 
 
 def read_folder(folder: Path) -> FlightRecord:
-    """Reads a flight folder (`shared.flight_folder`).
+    """Reads a flight folder (`shared.recordings.flight_folder`).
 
     Raises:
         ConfigError: Names the file and the row.

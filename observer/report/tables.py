@@ -12,8 +12,8 @@ from attrs import frozen
 from scipy.signal import butter, lfilter
 
 from observer.report.record import ROW_HZ, FlightRecord
-from shared.csv_table import Vec
 from shared.geometry import hull_area
+from shared.recordings.track import Vec
 
 SETTLING_ROWS = 10
 """The first differences are dropped: the recorder was still starting."""

@@ -12,11 +12,11 @@ import numpy as np
 from observer.report.record import ROW_HZ, FlightRecord, Played, mapped_hand, resample
 from observer.trace.read import Trace
 from shared.clock import NS_PER_S
-from shared.csv_table import Vec
 from shared.errors import ConfigError
 from shared.formation import Formation, build_formation
 from shared.geometry import hull_area
 from shared.messages import NO_HAND, DroneState, HandSample, Message, Mode, PatternEvent
+from shared.recordings.track import Vec
 from shared.scenario import Avoidance
 
 FORMED = (Mode.FOLLOW, Mode.HOLD)

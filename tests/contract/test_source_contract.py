@@ -14,8 +14,8 @@ from human_relay.sources.scripted import REST
 from shared.clock import NS_PER_S
 from shared.config import structure_scenario
 from shared.errors import ConfigError
-from shared.flight_folder import HAND_FILE, read_track
 from shared.messages import Wish
+from shared.recordings.flight_folder import HAND_FILE, read_track
 from tests.replay.flights import require_bag, require_flight
 
 START = 5_000 * NS_PER_S

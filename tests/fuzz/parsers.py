@@ -33,7 +33,6 @@ from observer.trace.read import open_trace
 from shared.codec import decode, encode
 from shared.config import SCENARIOS, load_scenario
 from shared.errors import DecodeError, SwarmTouchError
-from shared.flight_folder import read_meta, read_obstacles, read_patterns, read_track
 from shared.formation import build_formation
 from shared.net.audit import Audit
 from shared.net.keyring import Keyring
@@ -41,7 +40,8 @@ from shared.net.settings import node_settings
 from shared.nodes import all_nodes, drone_node
 from shared.pointer_link import decode_pointed
 from shared.radio_link import decode_datagram, encode_head, radio_group
-from shared.ros_bag import read_bag_tracks
+from shared.recordings.flight_folder import read_meta, read_obstacles, read_patterns, read_track
+from shared.recordings.ros_bag import read_bag_tracks
 from shared.senses import Senses
 from shared.signature import blank, sign_with, verify_with
 from shared.topics import HAND, TOPICS, rank, topic_of

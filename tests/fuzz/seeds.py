@@ -21,7 +21,7 @@ from shared.messages import FormationState, PatternEvent, ProcessStatus
 from shared.net.keyring import Keyring
 from shared.nodes import drone_node
 from shared.radio_link import encode_head
-from shared.ros_bag import TRANSFORM
+from shared.recordings.ros_bag import TRANSFORM
 from shared.signature import blank, sign_with
 from shared.topics import HAND
 from tests.traces import flight, hand, state, write

@@ -24,8 +24,8 @@ from glove_bridge.meaning import advice_pattern
 from glove_bridge.patterns import load_patterns
 from glove_bridge.rules import RULES
 from glove_bridge.scheduler import Request, Schedule, decide, ended, started
-from shared.flight_folder import read_meta
 from shared.formation import build_formation
+from shared.recordings.flight_folder import read_meta
 from tests.replay.flights import ABSENT, flight_folders
 from tests.replay.test_setpoint_law import flown_scenario, load, match_frames
 

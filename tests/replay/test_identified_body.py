@@ -16,7 +16,7 @@ import pytest
 from agents.vehicles.bodies.identified import step
 from agents.vehicles.bodies.pid import hovering
 from agents.vehicles.bodies.state import Command, Commands, Vec
-from shared.flight_folder import read_setpoints, read_track
+from shared.recordings.flight_folder import read_setpoints, read_track
 from tests.replay.flights import ABSENT, flight_folders
 
 SUBSTEP = 0.004

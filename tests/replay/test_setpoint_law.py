@@ -21,8 +21,15 @@ from agents.control.goals import all_rows, goals
 from agents.control.hand import HandInput, HandSettings, map_hand
 from agents.control.projection import project_exact
 from agents.control.single.vectors import ORIGIN, vector
-from shared.flight_folder import HAND_FILE, Meta, read_meta, read_obstacles, read_setpoints, read_track
 from shared.formation import build_formation
+from shared.recordings.flight_folder import (
+    HAND_FILE,
+    Meta,
+    read_meta,
+    read_obstacles,
+    read_setpoints,
+    read_track,
+)
 from shared.scenario import FormationSettings, Hand, Scenario
 from tests.replay.flights import each_flight
 

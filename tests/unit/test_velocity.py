@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from human_relay.velocity import MAX_GAP, MAX_SPEED, WINDOW, VelocityState, step
-from shared.flight_folder import HAND_FILE, read_track
+from shared.recordings.flight_folder import HAND_FILE, read_track
 from tests.replay.flights import require_flight
 
 Vec = npt.NDArray[np.float64]

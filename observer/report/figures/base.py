@@ -11,7 +11,7 @@ from matplotlib.patches import Circle
 
 from observer.colours import COLOURS, HAND, drone_colour
 from observer.report.record import FlightRecord
-from shared.csv_table import Vec
+from shared.recordings.track import Vec
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

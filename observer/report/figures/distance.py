@@ -7,7 +7,7 @@ import numpy as np
 from observer.colours import COLOURS, HAND
 from observer.report.figures.base import Drawing, Flights, legend_beside
 from observer.report.record import FlightRecord
-from shared.csv_table import Vec
+from shared.recordings.track import Vec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from observer.report.figures.base import AXES, MOST_NAMED, Columns, Drawing, Flights, components, legend_beside
-from shared.csv_table import Vec
+from shared.recordings.track import Vec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,26 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from attrs import frozen
 
-from shared.csv_table import LARGEST, Stamps, Vec, read_rows, read_table
 from shared.errors import ConfigError
+from shared.recordings.csv_table import LARGEST, read_rows, read_table
+from shared.recordings.track import Stamps, Track, Vec
 from shared.scenario import Obstacle, Pair
 
 HAND_FILE = "glove.csv.gz"
 PATTERN_FILE = "pattern_topic.csv.gz"
-
-
-class Track(NamedTuple):
-    """A recorded rigid body.
-
-    Attributes:
-        t_ns: (n,) source stamps, strictly increasing, ns.
-        position: (n, 3) world frame, m.
-        quaternion: (n, 4) x, y, z, w.
-    """
-
-    t_ns: Stamps
-    position: Vec
-    quaternion: Vec
 
 
 class Setpoints(NamedTuple):

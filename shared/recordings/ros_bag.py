@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shared.clock import NS_PER_S
-from shared.csv_table import Stamps
 from shared.errors import ConfigError
-from shared.flight_folder import Track
+from shared.recordings.track import Stamps, Track
 
 TRANSFORM = "geometry_msgs/msg/TransformStamped"
 POSE = "geometry_msgs/msg/PoseStamped"

@@ -7,12 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from shared.errors import ConfigError
-
-Vec = npt.NDArray[np.float64]
-Stamps = npt.NDArray[np.int64]
+from shared.recordings.track import Stamps, Vec
 
 LARGEST = 4e9
 """Size of the largest number: times in s up to it, until 2096, are 64 bits of ns apart at most."""
