@@ -94,7 +94,12 @@ def structure(tree: Mapping[str, Any], kind: type[T], origin: str) -> T:
 
 def dump_scenario(scenario: Scenario) -> str:
     """Writes a scenario as TOML that `load_scenario` reads back to an equal one."""
-    return tomli_w.dumps(_without_none(_converter.unstructure(scenario)))
+    return dump(scenario)
+
+
+def dump(settings: attrs.AttrsInstance) -> str:
+    """Writes any configuration class as TOML that `structure` reads back to an equal one."""
+    return tomli_w.dumps(_without_none(_converter.unstructure(settings)))
 
 
 def vehicle_settings(scenario: Scenario, drone: int) -> VehicleSettings:

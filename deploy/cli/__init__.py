@@ -17,6 +17,7 @@ COMMANDS = {
     "trace": "record, inspect, export and replay what a swarm says",
     "bench": "measure speed and cost against the floor of the transport",
     "sim": "fly a scenario on a virtual clock in one process",
+    "falsify": "look for the flight in which a scenario comes nearest to a collision",
     "net": "keys of a swarm and the network configuration of its nodes",
     "scenarios": "list the scenarios that ship",
 }
