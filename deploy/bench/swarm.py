@@ -1,11 +1,11 @@
 """Runs one swarm for a while, real or bare, and reads what its processes used: one phase of a measurement."""
 
 import asyncio
+import math
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
-from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -31,11 +31,9 @@ HAND = "scripted:tour"
 WARM_UP_S = 1.0
 """From the moment everybody is at work to the first sample that counts, s."""
 READY_S = 12.0
-"""Those that start at the same time, and then the swarm as a whole, have this long to come to work, and as long
-again per `READY_DRONES` drones of the swarm, s."""
+"""When all have announced themselves, they have this long to come to work, and as long again per `READY_DRONES`
+drones of the swarm, s."""
 READY_DRONES = 16
-AT_ONCE = 8
-"""So many processes start at the same time: more would starve each other's links until they count as dead."""
 GRACE_S = 0.5
 _PERIOD_S = 0.04
 
@@ -153,7 +151,7 @@ def _run(rows: Iterable[ProcessRow], ear: Ear, seconds: float, drones: int) -> P
 
 async def _measure(rows: Sequence[ProcessRow], ear: Ear, seconds: float, ready_s: float, logs: Path) -> Phase:
     ended: list[Child] = []
-    supervisor = Supervisor(logs, lambda child, *_: ended.append(child))
+    supervisor = Supervisor(logs, lambda child, *_: ended.append(child), is_up=lambda token: ear.hears([token]))
 
     async def until(done: Callable[[], bool], limit_s: float) -> bool:
         deadline = time.monotonic() + limit_s
@@ -167,13 +165,12 @@ async def _measure(rows: Sequence[ProcessRow], ear: Ear, seconds: float, ready_s
         return True
 
     try:
-        members = [row for row in rows if row.role != RELAY]
-        for first in range(0, len(members), AT_ONCE):
-            for row in members[first : first + AT_ONCE]:
+        for row in rows:
+            if row.role != RELAY:
                 supervisor.start(row)
-            tokens = [row.token for row in members[: first + AT_ONCE]]
-            if not await until(partial(ear.hears, tokens), ready_s):
-                raise BenchError(f"not everybody was there after {ready_s:.0f} s; close what else runs here")
+        await until(lambda: not supervisor.awaited, math.inf)
+        if missing := supervisor.missing:
+            raise BenchError(f"no sign of {', '.join(missing)}; close what else runs here")
         for row in rows:
             if row.role == RELAY:
                 supervisor.start(row)

@@ -5,7 +5,7 @@ import json
 import math
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -18,8 +18,6 @@ from deploy.launcher.supervisor import Child, Supervisor
 from shared.formation import Formation
 from shared.nodes import RELAY
 
-START_S = 8.0
-"""The hand waits at most this long for all processes to announce themselves."""
 LANDING_S = 6.0
 """A landing at the end of the flight may take so long,"""
 INTERRUPTED_LANDING_S = 4.5
@@ -69,6 +67,7 @@ class Flight:
         rows: The process table.
         monitor: What is heard of the flight.
         run_dir: Directory of this run.
+        files: What processes read when they start, see `Supervisor`.
         seconds: Length of the flight; None: until the hand ends it.
         view: Where to show it.
     """
@@ -80,6 +79,7 @@ class Flight:
         rows: tuple[ProcessRow, ...],
         monitor: Monitor,
         run_dir: Path,
+        files: Mapping[Path, str],
         seconds: float | None,
         view: View,
     ) -> None:
@@ -87,7 +87,13 @@ class Flight:
         self.monitor = monitor
         self.run_dir = run_dir
         self.phase = "starting"
-        self.supervisor = Supervisor(run_dir / "logs", self._unexpected_exit)
+        self.supervisor = Supervisor(
+            run_dir / "logs",
+            self._unexpected_exit,
+            say=view.event,
+            is_up=lambda token: token in monitor.present,
+            files=files,
+        )
         self._rows = rows
         self._seconds = seconds
         self._view = view
@@ -113,14 +119,12 @@ class Flight:
         return self._outcome(seconds, landed)
 
     async def _start_members(self) -> None:
-        members = [row for row in self._rows if row.role != RELAY]
-        for row in members:
-            self.supervisor.start(row)
-        tokens = {row.token for row in members}
-        await self._until(lambda: tokens <= self.monitor.present or self._cut_short, START_S)
-        missing = sorted(tokens - self.monitor.present)
-        if missing and not self._cut_short:
-            self._view.event(f"no sign of {', '.join(missing)} after {START_S:.0f} s; the hand starts without")
+        for row in self._rows:
+            if row.role != RELAY:
+                self.supervisor.start(row)
+        await self._until(lambda: not self.supervisor.awaited or self._cut_short, None)
+        if (missing := self.supervisor.missing) and not self._cut_short:
+            self._view.event(f"no sign of {', '.join(missing)}; the hand starts without")
 
     async def _fly(self) -> None:
         if self._cut_short:

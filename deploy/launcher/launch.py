@@ -7,6 +7,7 @@ from pathlib import Path
 
 from attrs import frozen
 from rich.console import Console
+from rich.text import Text
 
 from deploy.launcher.console import open_console
 from deploy.launcher.flight import Flight, Outcome
@@ -93,14 +94,23 @@ def launch(options: Options) -> Json:
     file.write_text(dump_scenario(scenario), encoding="utf-8")
     console = open_console(stderr=options.json)
     outcome, summary = asyncio.run(_fly(options, scenario, formation, hand, run_dir, console))
-    line = json.dumps(summary)
-    (run_dir / SUMMARY_FILE).write_text(f"{line}\n", encoding="utf-8")
     print_summary(summary, console)
+    line = json.dumps(summary)
+    if options.json and not outcome.refused:
+        print(line, flush=True)
+    _keep_summary(run_dir / SUMMARY_FILE, line, console)
     if outcome.refused:
         raise ConfigError(_refusal(outcome, run_dir))
-    if options.json:
-        print(line, flush=True)
     return summary
+
+
+def _keep_summary(path: Path, line: str, console: Console) -> None:
+    """Writes what has been printed; a disk that is full or gone costs the file, and it is said."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{line}\n", encoding="utf-8")
+    except OSError as error:
+        console.print(Text(f"launcher | the summary above is not in {path}: {error}"), soft_wrap=True)
 
 
 def _resolve(options: Options) -> tuple[Scenario, Formation, HandChoice]:
@@ -150,11 +160,16 @@ async def _fly(
             rows=rows,
             monitor=monitor,
             run_dir=run_dir,
+            files=_texts(run_dir / SCENARIO_FILE, run_dir / PATTERN_FILE),
             seconds=options.seconds,
             view=view,
         )
         outcome = await flight.run()
     return outcome, flight_summary(outcome, monitor, glove=options.glove)
+
+
+def _texts(*files: Path) -> dict[Path, str]:
+    return {file: file.read_text(encoding="utf-8") for file in files if file.exists()}
 
 
 def _console_choice(hand: HandChoice, run_dir: Path) -> ConsoleChoice:
