@@ -1,6 +1,6 @@
 """One drone's brain without I/O: bytes and time in, state out. The process loop and the simulator drive it."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from agents.control.hand import HandInput
 from agents.control.modes import HAND_STALE
@@ -11,8 +11,9 @@ from agents.control.step import Inputs, Settings, State, start, step
 from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
+from shared.fence import bodies_of
 from shared.formation import Formation
-from shared.messages import NO_HAND, DroneState, HandSample, Heard
+from shared.messages import NO_HAND, DroneState, Flag, HandSample, Heard
 from shared.net.keyring import hand_verifier
 from shared.nodes import neighbours
 from shared.scenario import Scenario
@@ -28,7 +29,11 @@ SILENT_AFTER = 0.1
 SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
 """... from this distance on, growing at this rate, up to this, m and m/s."""
 FORGOTTEN_AFTER = 5.0
-"""After this long its body is no longer in the air, s."""
+"""After this long its body is no longer in the air, s ..."""
+DOUBTED_FOR = 1.0
+"""... unless somebody still speaks for it, be it what cannot be believed; that is told for this long, s."""
+_DOUBTED_NS = round(DOUBTED_FOR * NS_PER_S)
+_FORGOTTEN_NS = round(FORGOTTEN_AFTER * NS_PER_S)
 _SILENT_NS = round(SILENT_AFTER * NS_PER_S)
 
 
@@ -46,7 +51,9 @@ class Agent:
     def __init__(
         self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
     ) -> None:
-        self.senses = Senses(neighbours(scenario, formation, drone), hand_verifier(scenario.net))
+        self.senses = Senses(
+            neighbours(scenario, formation, drone), hand_verifier(scenario.net), bodies_of(scenario, formation)
+        )
         self.steps = 0
         self._drone = drone
         self._epoch = epoch
@@ -101,7 +108,7 @@ class Agent:
             displacements={name: links[i].displacement for i, name in enumerate(self._links)},
             pose_age=pose_age,
             battery=pose.battery,
-            flags=output.flags,
+            flags=output.flags | Flag.REJECTED_INPUT if self._doubts(now_ns) else output.flags,
             heard=self._note_used(self._state),
             step_ns=now_ns,
         )
@@ -134,7 +141,7 @@ class Agent:
 
     def _inputs(self, now_ns: int, pose: Pose, pose_age: float) -> Inputs:
         hand, heard = self.senses.hand, self.senses.drones
-        drones, silent = _around(heard.values(), now_ns)
+        drones, silent = _around(self.senses, now_ns)
         return Inputs(
             position=pose.position,
             velocity=pose.velocity,
@@ -161,6 +168,10 @@ class Agent:
             age=sensed.age(now_ns),
             fresh=self._is_fresh(key, sensed),
         )
+
+    def _doubts(self, now_ns: int) -> bool:
+        """Says whether what the hand or a neighbour said was not believed, a moment ago."""
+        return any(now_ns - doubted_ns <= _DOUBTED_NS for doubted_ns in self.senses.doubted_ns.values())
 
     def _note_used(self, state: State) -> dict[str, Heard]:
         """Notes, and returns, what this step used: hand, references, and who stands behind one that is gone."""
@@ -189,21 +200,23 @@ def hand_input(sample: HandSample) -> HandInput:
     )
 
 
-def _around(drones: Iterable[Sensed[DroneState]], now_ns: int) -> tuple[list[Encounter], list[Bystander]]:
+def _around(senses: Senses, now_ns: int) -> tuple[list[Encounter], list[Bystander]]:
     """Returns where the other drones are, and who of them has fallen silent.
 
     One that is silent stays there for as long as its body may be in the air, and may drift or fall, but comes
-    no closer.
+    no closer. So does one that speaks and is not believed: what it says moves nobody, but it is there.
     """
     encounters, silent = [], []
-    for sensed in drones:
+    for drone, sensed in senses.drones.items():
         (x, y, _), (u, v, _) = sensed.message.position, sensed.message.velocity
         if now_ns - sensed.arrival_ns <= _SILENT_NS:
             encounters.append((x, y, u, v))
             continue
         age = sensed.age(now_ns)
         if age > FORGOTTEN_AFTER:
-            continue
+            doubted_ns = senses.doubted_ns.get(DRONE_STATE.key(id=drone))
+            if doubted_ns is None or now_ns - doubted_ns > _FORGOTTEN_NS:
+                continue
         encounters.append((x, y, u, v) if age <= DRONE_STATE.stale_s else (x, y, 0.0, 0.0))
         radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
         silent.append(Bystander(x, y, radius))

@@ -18,6 +18,7 @@ from glove_bridge.rules import RULES
 from glove_bridge.scheduler import Request, Schedule, decide, ended, started
 from glove_bridge.swarm_view import FORMED, DroneStates, all_heard, missing_drones, newest_heard, scene_of
 from shared.errors import ConfigError
+from shared.fence import bodies_of
 from shared.formation import Formation
 from shared.messages import FormationState, Heard, PatternEvent, Wish
 from shared.net.keyring import hand_verifier
@@ -72,7 +73,7 @@ class Bridge:
                 f"pattern set {patterns.name!r} means {patterns.meaning!r}; choose one that means"
                 f" {' or '.join(map(repr, MEANINGS))}"
             )
-        self.senses = Senses(formation.ids, hand_verifier(scenario.net))
+        self.senses = Senses(formation.ids, hand_verifier(scenario.net), bodies_of(scenario, formation))
         self.missing = formation.ids
         self.counts: Counter[Outcome] = Counter()
         self.steps = 0

@@ -14,11 +14,13 @@ class DecodeError(SwarmTouchError):
 
     Attributes:
         reason: Short, stable word to count by (for example `malformed`, `oversized`, `version`).
+        detail: What exactly, for a log.
     """
 
     def __init__(self, reason: str, detail: str = "") -> None:
         super().__init__(f"{reason}: {detail}" if detail else reason)
         self.reason = reason
+        self.detail = detail
 
 
 class DeviceError(SwarmTouchError):

@@ -1,8 +1,9 @@
-"""The box that no drone leaves."""
+"""The box that no drone leaves, and what a body in it can do."""
 
 import numpy as np
 
 from shared.formation import Formation, Vec
+from shared.plausibility import MotionLimits, body_limits
 from shared.scenario import Scenario
 
 UNLIMITED = 1e3
@@ -26,6 +27,14 @@ def fence_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:
         np.array(fence.min) if fence.min is not None else low,
         np.array(fence.max) if fence.max is not None else high,
     )
+
+
+def bodies_of(scenario: Scenario, formation: Formation) -> MotionLimits:
+    """Returns what the bodies of a swarm can do, for those who hear where they are said to be."""
+    low, high = fence_box(scenario, formation)
+    (a, b, c), (d, e, f) = low.tolist(), high.tolist()
+    fastest = max(scenario.limits.speed, scenario.hand.max_speed, scenario.limits.takeoff_speed)
+    return body_limits((a, b, c), (d, e, f), fastest)
 
 
 def goal_box(scenario: Scenario, formation: Formation) -> tuple[Vec, Vec]:

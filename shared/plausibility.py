@@ -80,6 +80,28 @@ class Believed(Struct, frozen=True):
     reach: float
 
 
+def check_possible(position: Vector, velocity: Vector, limits: MotionLimits) -> None:
+    """Refuses a place or a velocity that cannot be, whatever was before.
+
+    Args:
+        position: m.
+        velocity: m/s.
+        limits: What is possible.
+
+    Raises:
+        DecodeError: `outside` (the place) or `too-fast` (the velocity).
+    """
+    x, y, z = position
+    (a, b, c), (d, e, f) = limits.low, limits.high
+    if not (a <= x <= d and b <= y <= e and c <= z <= f):
+        raise DecodeError(
+            "outside", f"at {_said(position)} m, not within {_said(limits.low)} to {_said(limits.high)}"
+        )
+    u, v, w = velocity
+    if not math.hypot(u, v, w * limits.speed / limits.vertical_speed) <= limits.speed:
+        raise DecodeError("too-fast", f"{_said(velocity)} m/s")
+
+
 def believe(
     known: Believed | None, position: Vector, velocity: Vector, at_ns: int, limits: MotionLimits
 ) -> Believed:
@@ -99,20 +121,11 @@ def believe(
         DecodeError: `outside` (not within the limits), `too-fast` (the velocity) or `jump` (it cannot have come
             there from where it was). Keep `known`: the next claim is judged by it, with more time passed.
     """
-    x, y, z = position
-    (a, b, c), (d, e, f) = limits.low, limits.high
-    if not (a <= x <= d and b <= y <= e and c <= z <= f):
-        raise DecodeError(
-            "outside", f"at {_said(position)} m, not within {_said(limits.low)} to {_said(limits.high)}"
-        )
-    u, v, w = velocity
-    squash = limits.speed / limits.vertical_speed
-    if not math.hypot(u, v, w * squash) <= limits.speed:
-        raise DecodeError("too-fast", f"{_said(velocity)} m/s")
+    check_possible(position, velocity, limits)
     if known is None:
         return Believed(position, at_ns, limits.slack)
-    p, q, r = known.position
-    way = math.hypot(x - p, y - q, (z - r) * squash)
+    (x, y, z), (p, q, r) = position, known.position
+    way = math.hypot(x - p, y - q, (z - r) * limits.speed / limits.vertical_speed)
     passed = at_ns - known.at_ns
     reach = known.reach + limits.speed * passed / NS_PER_S if passed > 0 else known.reach
     if not way <= reach:

@@ -6,11 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Generic, TypeVar
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from shared.clock import NS_PER_S
 from shared.codec import decode
 from shared.errors import DecodeError
-from shared.messages import DroneState, HandSample, Heard, Message
+from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, Wish
+from shared.order import Sample, check_newer
+from shared.plausibility import HAND_LIMITS, Believed, MotionLimits, believe, check_possible
 from shared.signature import Verify
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
@@ -42,21 +45,33 @@ class Sensed(Struct, Generic[M], frozen=True):
 class Senses:
     """Newest valid hand sample and drone states of one listener.
 
+    What cannot be (`shared.plausibility`) is not taken in. Of a hand only the motion is not: the wish counts,
+    or a STOP would be lost with it, and one that wishes to FLY holds. A drone that is not believed stays where
+    it was believed last, and grows old there.
+
     Args:
         ids: Numbers of the drones to listen to.
         verify: Checks the signature of hand samples; None accepts unsigned ones.
+        bodies: What the bodies of drones can do; None believes everything, as one who only shows it does.
 
     Attributes:
         hand: Newest hand sample, None before the first.
         drones: Newest state per drone that was ever heard.
+        doubted_ns: When something that was not believed last came, by key (own clock).
         rejected: Dropped samples by reason.
     """
 
-    def __init__(self, ids: Iterable[int], verify: Verify | None = None) -> None:
+    def __init__(
+        self, ids: Iterable[int], verify: Verify | None = None, bodies: MotionLimits | None = None
+    ) -> None:
         self.hand: Sensed[HandSample] | None = None
         self.drones: dict[int, Sensed[DroneState]] = {}
         self.rejected: Counter[str] = Counter()
+        self.doubted_ns: dict[str, int] = {}
         self._verify = verify
+        self._bodies = bodies
+        self._believed: dict[int, Believed] = {}
+        self._believed_hand: Believed | None = None
         self._ids = {DRONE_STATE.key(id=drone): drone for drone in ids}
         self._logged_ns = 0
 
@@ -75,30 +90,41 @@ class Senses:
                     self._reject(key, error, arrival_ns)
 
     def hear_hand(self, sensed: Sensed[HandSample]) -> None:
-        """Takes a sample in.
+        """Takes a sample in; of one whose motion cannot be, the wish.
 
         Raises:
             DecodeError: It is not newer than the last one.
         """
-        _check_newer(sensed, self.hand, HAND.stale_s)
+        if self.hand is not None:
+            check_newer(_order(sensed), _order(self.hand), HAND.stale_s)
+        sample = sensed.message
+        if sample.position != NO_HAND:
+            try:
+                self._believed_hand = believe(
+                    self._believed_hand, sample.position, sample.velocity, sensed.arrival_ns, HAND_LIMITS
+                )
+            except DecodeError as error:
+                self.doubted_ns[_HAND_KEY] = sensed.arrival_ns
+                self._reject(_HAND_KEY, DecodeError(f"hand-{error.reason}", error.detail), sensed.arrival_ns)
+                sensed = Sensed(self._at_rest(sample), sensed.arrival_ns)
         self.hand = sensed
 
     def hear_drone(self, sensed: Sensed[DroneState]) -> None:
-        """Takes a state in.
+        """Takes a state in that need not be doubted.
 
         Raises:
             DecodeError: It is not newer than the last one of that drone.
         """
-        drone = sensed.message.id
-        _check_newer(sensed, self.drones.get(drone), DRONE_STATE.stale_s)
-        self.drones[drone] = sensed
+        self._check_drone(sensed)
+        self.drones[sensed.message.id] = sensed
 
     def _take_one(self, key: str, payload: bytes, arrival_ns: int) -> None:
         if key == _HAND_KEY:
             sample = Sensed(decode(payload, HandSample), arrival_ns)
             if self._verify:
                 # A signed sample that is older was recorded from the air: no silence makes it acceptable.
-                _check_newer(sample, self.hand, NEVER)
+                if self.hand is not None:
+                    check_newer(_order(sample), _order(self.hand), NEVER)
                 self._verify(payload)
             self.hear_hand(sample)
             return
@@ -108,7 +134,41 @@ class Senses:
         state = decode(payload, DroneState)
         if state.id != drone:
             raise DecodeError("wrong-id", f"drone {state.id} on {key}")
-        self.hear_drone(Sensed(state, arrival_ns))
+        sensed = Sensed(state, arrival_ns)
+        self._check_drone(sensed)
+        if self._bodies is not None:
+            self._believe(key, sensed, self._bodies)
+        self.drones[drone] = sensed
+
+    def _check_drone(self, sensed: Sensed[DroneState]) -> None:
+        if (known := self.drones.get(sensed.message.id)) is not None:
+            check_newer(_order(sensed), _order(known), DRONE_STATE.stale_s)
+
+    def _believe(self, key: str, sensed: Sensed[DroneState], bodies: MotionLimits) -> None:
+        """Remembers a state that can be.
+
+        Raises:
+            DecodeError: It cannot; whoever says so is doubted from now on.
+        """
+        state, at_ns = sensed.message, sensed.arrival_ns
+        try:
+            check_possible(state.goal, state.goal_velocity, bodies)
+            known = self._believed.get(state.id)
+            self._believed[state.id] = believe(known, state.position, state.velocity, at_ns, bodies)
+        except DecodeError:
+            self.doubted_ns[key] = at_ns
+            raise
+
+    def _at_rest(self, sample: HandSample) -> HandSample:
+        """Returns a hand where it was believed last, with the wish of a sample whose motion cannot be."""
+        known, believed = self.hand, self._believed_hand
+        return replace(
+            sample,
+            position=NO_HAND if believed is None else believed.position,
+            velocity=ORIGIN,
+            yaw=sample.yaw if known is None else known.message.yaw,
+            mode=Wish.HOLD if sample.mode is Wish.FLY else sample.mode,
+        )
 
     def _reject(self, key: str, error: DecodeError, now_ns: int) -> None:
         self.rejected[error.reason] += 1
@@ -117,18 +177,5 @@ class Senses:
             _log.warning("dropped a sample on %s: %s (so far %s)", key, error, dict(self.rejected))
 
 
-def _check_newer(sensed: Sensed[M], known: Sensed[M] | None, stale_s: float) -> None:
-    """Refuses what is not newer by (epoch, seq).
-
-    Raises:
-        DecodeError: `out-of-order`. An older epoch is accepted once the newer one has fallen silent, or a
-            publisher whose clock was set back would never be heard again.
-    """
-    if known is None:
-        return
-    message, last = sensed.message, known.message
-    if message.epoch == last.epoch and message.seq > last.seq:
-        return
-    if message.epoch > last.epoch or (message.epoch < last.epoch and known.age(sensed.arrival_ns) > stale_s):
-        return
-    raise DecodeError("out-of-order", f"({message.epoch}, {message.seq}) after ({last.epoch}, {last.seq})")
+def _order(sensed: Sensed[M]) -> Sample:
+    return (sensed.message.epoch, sensed.message.seq, sensed.arrival_ns)

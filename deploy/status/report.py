@@ -10,7 +10,13 @@ from shared.nodes import DRONE, RELAY, WORLD
 
 WELL_STATES = ("running", "starting")
 WORRYING = (
-    Flag.BLOCKED | Flag.FENCE | Flag.LOW_BATTERY | Flag.CRITICAL_BATTERY | Flag.OLD_POSE | Flag.HAND_STALE
+    Flag.BLOCKED
+    | Flag.FENCE
+    | Flag.LOW_BATTERY
+    | Flag.CRITICAL_BATTERY
+    | Flag.OLD_POSE
+    | Flag.HAND_STALE
+    | Flag.REJECTED_INPUT
 )
 
 

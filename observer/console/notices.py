@@ -12,6 +12,7 @@ _FLAGS = (
     (Flag.BLOCKED, "warning", "blocked: does not reach its goal"),
     (Flag.LOW_BATTERY, "warning", "battery low"),
     (Flag.OLD_POSE, "warning", "does not know where it is: its pose is old"),
+    (Flag.REJECTED_INPUT, "warning", "does not believe what it hears: who says so is in its log"),
 )
 
 

@@ -262,6 +262,26 @@ class FakeVehicle:
             self._stopping.set()
 
 
+def encounters(brain: Agent, at: int) -> list[Vector]:
+    """Returns where a drone believes the others to be."""
+    return [(x, y, 0.0) for x, y, *_ in brain._inputs(at, FLYING, 0.0).drones]
+
+
+def test_a_liar_moves_nobody_and_its_body_is_not_forgotten_while_it_speaks() -> None:
+    brain = agent(1)
+    brain.step(T0, FLYING, 0.0)
+    hear(brain, T0, state(2, 0, position=(-1.0, 0.5, 1.2)))
+    for tick in range(1, 600):
+        now = T0 + tick * 16 * MS
+        hear(brain, now, state(2, tick, position=(-0.5, 60.0 + tick % 2, 1.2)))
+        told = brain.step(now, FLYING, 0.0)
+        assert Flag.REJECTED_INPUT in told.flags
+        assert encounters(brain, now) == [(-1.0, 0.5, 0.0)]
+    assert brain.senses.rejected == {"outside": 599}
+    assert encounters(brain, now + 6 * NS_PER_S) == []
+    assert Flag.REJECTED_INPUT not in brain.step(now + 2 * NS_PER_S, FLYING, 0.0).flags
+
+
 class Ticker:
     """A clock that advances by one millisecond whenever it is read."""
 

@@ -11,8 +11,9 @@ from msgspec.structs import replace
 from shared.clock import NS_PER_S
 from shared.codec import encode
 from shared.config import load_scenario
+from shared.fence import bodies_of
 from shared.formation import build_formation
-from shared.messages import ORIGIN, DroneState, HandSample, Heard, Message, Mode, Wish
+from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, Mode, Vector, Wish
 from shared.nodes import neighbours
 from shared.senses import Senses
 from shared.topics import DRONE_STATE, HAND
@@ -35,11 +36,16 @@ STATE = DroneState(
     mode=Mode.FOLLOW,
 )
 TWO = DRONE_STATE.key(id=2)
+MS = NS_PER_S // 1000
 SILENCE_NS = round(HAND.stale_s * NS_PER_S)
 
 
 def senses() -> Senses:
     return Senses(neighbours(SCENARIO, FORMATION, 4))
+
+
+def doubting() -> Senses:
+    return Senses(neighbours(SCENARIO, FORMATION, 4), None, bodies_of(SCENARIO, FORMATION))
 
 
 def hear(sensing: Senses, key: str, *messages: Message, at: int = 0) -> None:
@@ -84,14 +90,45 @@ def test_whatever_the_order_the_newest_wins_and_every_older_one_is_counted(order
     assert sensing.rejected == ({"out-of-order": late} if late else {})
 
 
-@pytest.mark.parametrize("seq", [10, 9, 0])
-def test_a_repeated_or_older_sample_is_out_of_order_however_late(seq: int) -> None:
+@pytest.mark.parametrize("late_ns", [0, SILENCE_NS, 100 * SILENCE_NS])
+def test_a_repeated_sample_is_out_of_order_however_late(late_ns: int) -> None:
     sensing = senses()
     hear(sensing, HAND.key(), SAMPLE)
-    hear(sensing, HAND.key(), replace(SAMPLE, seq=seq), at=100 * SILENCE_NS)
+    hear(sensing, HAND.key(), SAMPLE, at=late_ns)
     assert sensing.rejected == {"out-of-order": 1}
     assert sensing.hand is not None
     assert sensing.hand.arrival_ns == 0
+
+
+@pytest.mark.parametrize("seq", [2**64 - 1, 2**32, 10 + 1_000])
+def test_one_sample_out_of_the_future_silences_nobody(seq: int) -> None:
+    sensing = senses()
+    hear(sensing, HAND.key(), SAMPLE)
+    hear(sensing, HAND.key(), replace(SAMPLE, seq=seq), at=MS)
+    hear(sensing, HAND.key(), replace(SAMPLE, seq=11, mode=Wish.STOP), at=16 * MS)
+    assert kept(sensing) == (5, 11)
+    assert sensing.rejected == {"ahead": 1}
+
+
+@pytest.mark.parametrize("first", [2**64 - 1, 100])
+def test_who_was_silenced_by_a_first_sample_out_of_the_future_is_heard_once_that_is_stale(first: int) -> None:
+    sensing = senses()
+    hear(sensing, TWO, replace(STATE, seq=first))
+    stale_ns = round(DRONE_STATE.stale_s * NS_PER_S)
+    hear(sensing, TWO, STATE, at=stale_ns)
+    assert sensing.rejected == {"out-of-order": 1}
+    hear(sensing, TWO, replace(STATE, seq=11), at=stale_ns + 1)
+    assert sensing.drones[2].message.seq == 11
+
+
+@given(gaps_ms=st.lists(st.integers(0, 20_000), min_size=1, max_size=20), rate_hz=st.integers(1, 1000))
+def test_whatever_is_lost_or_held_up_the_publisher_is_heard(gaps_ms: list[int], rate_hz: int) -> None:
+    sensing, now_ms = senses(), 0
+    hear(sensing, TWO, replace(STATE, seq=0))
+    for gap_ms in gaps_ms:
+        now_ms += gap_ms
+        hear(sensing, TWO, replace(STATE, seq=now_ms * rate_hz // 1000 + 1), at=now_ms * MS)
+    assert not {"ahead"} & set(sensing.rejected)
 
 
 def test_a_restarted_publisher_is_heard_from_its_first_sample() -> None:
@@ -161,3 +198,73 @@ def test_the_log_is_limited_in_rate(caplog: pytest.LogCaptureFixture) -> None:
     assert len(caplog.records) == 3
     assert all("human/hand" in record.getMessage() for record in caplog.records)
     assert "'malformed': 103" in caplog.records[-1].getMessage()
+
+
+AT_HOME = replace(STATE, position=(0.0, 0.0, 1.2), goal=(0.0, 0.0, 1.2))
+IMPOSSIBLE = {
+    "jump": {"position": (1.0, 1.0, 1.2)},
+    "too-fast": {"velocity": (30.0, 0.0, 0.0)},
+    "outside": {"position": (0.0, 60.0, 1.2)},
+}
+
+
+@pytest.mark.parametrize("reason", IMPOSSIBLE)
+def test_a_drone_that_lies_about_its_place_is_neither_avoided_nor_followed_there(reason: str) -> None:
+    sensing = doubting()
+    hear(sensing, TWO, AT_HOME)
+    hear(sensing, TWO, replace(AT_HOME, seq=11, **IMPOSSIBLE[reason]), at=16 * MS)
+    assert sensing.drones[2].message == AT_HOME
+    assert sensing.rejected == {reason: 1}
+    assert sensing.doubted_ns == {TWO: 16 * MS}
+
+
+@pytest.mark.parametrize(
+    "lie", [{"goal": (0.0, 60.0, 1.2)}, {"goal_velocity": (0.0, 30.0, 0.0)}], ids=lambda lie: next(iter(lie))
+)
+def test_a_goal_that_nobody_can_have_is_not_followed(lie: dict[str, Vector]) -> None:
+    sensing = doubting()
+    hear(sensing, TWO, AT_HOME)
+    hear(sensing, TWO, replace(AT_HOME, seq=11, **lie), at=16 * MS)
+    assert sensing.drones[2].message == AT_HOME
+
+
+def test_a_body_that_is_elsewhere_after_a_restart_is_believed_once_it_can_have_got_there() -> None:
+    sensing = doubting()
+    hear(sensing, TWO, AT_HOME)
+    elsewhere = replace(AT_HOME, epoch=6, position=(2.0, 2.0, 0.0))
+    for tick in range(60):
+        hear(sensing, TWO, replace(elsewhere, seq=tick), at=tick * 16 * MS)
+    assert sensing.drones[2].message == replace(elsewhere, seq=59)
+    assert sensing.rejected["jump"] < 60 * 0.6
+
+
+def test_who_only_shows_what_is_said_shows_lies_as_well() -> None:
+    sensing = senses()
+    hear(sensing, TWO, AT_HOME, replace(AT_HOME, seq=11, position=(0.0, 60.0, 1.2)))
+    assert sensing.drones[2].message.position == (0.0, 60.0, 1.2)
+
+
+JUMPED = replace(SAMPLE, seq=11, position=(2.0, 0.0, 1.0), velocity=(1.0, 0.0, 0.0), yaw=3.0)
+
+
+@pytest.mark.parametrize(
+    ("wish", "kept_wish"),
+    [(Wish.FLY, Wish.HOLD), (Wish.HOLD, Wish.HOLD), (Wish.LAND, Wish.LAND), (Wish.STOP, Wish.STOP)],
+)
+def test_of_a_hand_that_jumps_the_wish_counts_and_the_motion_does_not(wish: Wish, kept_wish: Wish) -> None:
+    sensing = senses()
+    hear(sensing, HAND.key(), SAMPLE)
+    hear(sensing, HAND.key(), replace(JUMPED, mode=wish), at=16 * MS)
+    assert sensing.hand is not None
+    assert sensing.hand.message == replace(SAMPLE, seq=11, mode=kept_wish)
+    assert sensing.rejected == {"hand-jump": 1}
+    hear(sensing, HAND.key(), replace(JUMPED, seq=12), at=200 * MS)
+    assert sensing.hand.message == replace(JUMPED, seq=12)
+
+
+def test_a_hand_is_judged_anew_where_there_was_none() -> None:
+    sensing = senses()
+    hear(sensing, HAND.key(), replace(SAMPLE, position=NO_HAND, mode=Wish.HOLD), replace(JUMPED, seq=12))
+    assert sensing.hand is not None
+    assert sensing.hand.message == replace(JUMPED, seq=12)
+    assert not sensing.rejected
