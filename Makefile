@@ -8,20 +8,31 @@ UV := .bootstrap/uv
 BIN := .venv/bin
 RUNTIME := .venv/.runtime
 DEVELOPMENT := .venv/.development
+# mypyc in an environment of its own: setuptools, which it needs, would slow every start of a Python in .venv.
+COMPILER := .bootstrap/compiler
+COMPILE := UV_PROJECT_ENVIRONMENT=$(COMPILER) $(UV) sync --frozen --quiet --no-dev --group compile \
+	--no-install-project --python $(BIN)/python && $(COMPILER)/bin/python -m deploy.compile
+WHERE_POSSIBLE := if $(BIN)/python -m deploy.compile.toolchain; then $(COMPILE) || echo "flying in the pure form"; fi
 
-.PHONY: help demo env test check lint chip chaos clean
+.PHONY: help demo env compile test check lint chip chaos clean
 
 help:  ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
 
 demo: $(RUNTIME)  ## fly the paper's rhombus for 30 s, simulated, or for longer by hand in the browser
+	@$(WHERE_POSSIBLE)
 	$(BIN)/swarmtouch up slalom --console --hand "scripted:tour?duration=26" --glove terminal://
 
 env: $(DEVELOPMENT)  ## set up everything that developing needs in .venv/
+	@$(WHERE_POSSIBLE)
+
+compile: $(RUNTIME)  ## compile the control law to native code; demo, env and test do it where there is a C compiler
+	@$(BIN)/python -m deploy.compile.toolchain && $(COMPILE)
 
 # Flights with real processes want the machine to themselves; everything else shares it. What a busy machine spoils
 # is flown again, twice at most and by name in the output: a defect spoils every flight, noise one.
 test: lint  ## everything CI runs: format, lint, types, import contracts, all tests
+	@$(WHERE_POSSIBLE)
 	$(BIN)/pytest --numprocesses auto tests/unit tests/contract tests/replay
 	$(BIN)/pytest --reruns 2 -raR tests/integration
 
