@@ -10,7 +10,7 @@ import enum
 import functools
 import math
 from collections.abc import Callable
-from typing import Annotated, Any, TypeVar, cast, get_args, get_origin
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import msgpack
 import msgspec
@@ -18,7 +18,7 @@ from cattrs import Converter
 from msgspec import structs
 
 from shared.errors import DecodeError
-from shared.messages import SCHEMA_VERSION, Flag, Heard, Message, Mode, UInt64, Wish
+from shared.messages import SCHEMA_VERSION, Flag, Message, Mode, Wish
 
 MAX_PAYLOAD = 4096
 """Largest payload in bytes that is looked at at all."""
@@ -133,6 +133,12 @@ def _text(value: Any, _: Any = str) -> str:
     return value
 
 
+def _boolean(value: Any, _: Any = bool) -> bool:
+    if type(value) is not bool:
+        raise DecodeError("wrong-type", f"true or false is expected, not {value!r:.40}")
+    return value
+
+
 def _binary(value: Any, _: Any = bytes) -> bytes:
     if type(value) is not bytes:
         raise DecodeError("wrong-type", f"bytes are expected, not {value!r:.40}")
@@ -188,11 +194,18 @@ def _vector_hook(kind: Any) -> Hook:
     return vector
 
 
-def _heard(value: Any, _: Any) -> Heard:
-    if type(value) is not tuple or len(value) != 3:
-        raise DecodeError("wrong-type", f"(epoch, seq, arrival) is expected, not {value!r:.40}")
-    epoch, seq, arrival_ns = value
-    return Heard(_unsigned(epoch, int), _unsigned(seq, int), _unsigned(arrival_ns, int))
+def _record_hook(kind: Any) -> Hook:
+    """Makes the hook of a named tuple."""
+    hints = get_type_hints(kind, include_extras=True)
+    hooks = [(_converter.get_structure_hook(hint), hint) for hint in hints.values()]
+    names = ", ".join(hints)
+
+    def record(value: Any, _: Any) -> Any:
+        if type(value) is not tuple or len(value) != len(hooks):
+            raise DecodeError("wrong-type", f"({names}) is expected, not {value!r:.40}")
+        return kind(*[hook(item, hint) for item, (hook, hint) in zip(value, hooks, strict=True)])
+
+    return record
 
 
 def _sequence_hook(kind: Any) -> Hook:
@@ -236,9 +249,6 @@ def _mapping_hook(kind: Any) -> Hook:
     return mapping
 
 
-_unsigned = _ranged_hook(UInt64)
-
-
 def _is_sequence(kind: Any) -> bool:
     return get_origin(kind) is tuple and ... in get_args(kind)
 
@@ -255,12 +265,17 @@ def _is_ranged(kind: Any) -> bool:
     return get_origin(kind) is Annotated and isinstance(get_args(kind)[1], msgspec.Meta)
 
 
+def _is_record(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
+
+
 def _is_message(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, Message)
 
 
 def _make_converter() -> Converter:
     converter = Converter(detailed_validation=False)
+    converter.register_structure_hook(bool, _boolean)
     converter.register_structure_hook(int, _integer)
     converter.register_structure_hook(float, _number)
     converter.register_structure_hook(str, _text)
@@ -270,7 +285,7 @@ def _make_converter() -> Converter:
     converter.register_structure_hook_factory(_is_vector, _vector_hook)
     converter.register_structure_hook_factory(_is_mapping, _mapping_hook)
     converter.register_structure_hook_factory(_is_message, _message_hook)
-    converter.register_structure_hook_func(lambda kind: kind is Heard, _heard)
+    converter.register_structure_hook_factory(_is_record, _record_hook)
     # By class, because a hook for `str` or `int` would also take their subclasses and leave a bare string.
     converter.register_structure_hook(Flag, _flags)
     for words in (Wish, Mode):

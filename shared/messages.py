@@ -72,6 +72,10 @@ class Flag(enum.IntFlag, boundary=enum.CONFORM):
     REFERENCE_LOST = 256
     REJECTED_INPUT = 512
     AVOIDING = 1024
+    WAITING = 2048
+    """It has not heard everybody whom it must avoid, and does not know where they are."""
+    MISSED = 4096
+    """Not everybody who must avoid it hears it."""
 
     @classmethod
     def _missing_(cls, value: object) -> Any:
@@ -87,6 +91,24 @@ class Heard(NamedTuple):
     epoch: UInt64
     seq: UInt64
     arrival_ns: UInt64
+
+
+MOST_LOST = 16
+"""Of so many lost drones at most the places are told."""
+
+
+class Lost(NamedTuple):
+    """A drone that somebody no longer hears: where it was seen last, and whether it can still be in the air.
+
+    `epoch` and `seq` are those of the state in which it was seen, `age` (s) is how long ago that was heard.
+    """
+
+    id: DroneId
+    epoch: UInt64
+    seq: UInt64
+    position: Position
+    age: Seconds
+    down: bool
 
 
 NO_FLAGS = Flag(0)
@@ -134,6 +156,8 @@ class DroneState(Message, frozen=True, kw_only=True):
         battery: Charge, 0..1.
         flags: Conditions, see `Flag`.
         heard: The inputs this step used: key -> (epoch, seq, arrival).
+        unheard: Numbers of the drones that it should hear, and does not.
+        lost: Where it saw those of them last whom it ever heard.
         step_ns: When the step started (publisher's clock, same as `stamp_ns` and `arrival_ns`).
     """
 
@@ -149,6 +173,8 @@ class DroneState(Message, frozen=True, kw_only=True):
     battery: Fraction = 1.0
     flags: Flag = NO_FLAGS
     heard: dict[str, Heard] = {}
+    unheard: tuple[DroneId, ...] = ()
+    lost: tuple[Lost, ...] = ()
     step_ns: UInt64 = 0
 
 

@@ -16,6 +16,7 @@ from shared.messages import (
     FormationState,
     HandSample,
     Heard,
+    Lost,
     Message,
     Mode,
     PatternEvent,
@@ -36,6 +37,7 @@ NAMES = st.text(max_size=12)
 NOT_NEGATIVE = st.floats(0.0, 1e9)
 ENVELOPE = {"epoch": UINT64, "seq": UINT64, "stamp_ns": UINT64}
 HEARD = st.dictionaries(NAMES, st.builds(Heard, UINT64, UINT64, UINT64), max_size=4)
+LOST = st.builds(Lost, st.integers(1, 65_535), UINT64, UINT64, POSITIONS, NOT_NEGATIVE, st.booleans())
 
 MESSAGES: dict[type[Message], st.SearchStrategy[Any]] = {
     HandSample: st.builds(
@@ -62,6 +64,8 @@ MESSAGES: dict[type[Message], st.SearchStrategy[Any]] = {
         battery=st.floats(0.0, 1.0),
         flags=st.integers(0, int(sum(Flag))).map(Flag),
         heard=HEARD,
+        unheard=st.lists(st.integers(1, 65_535), max_size=4).map(tuple),
+        lost=st.lists(LOST, max_size=3).map(tuple),
         step_ns=UINT64,
     ),
     FormationState: st.builds(

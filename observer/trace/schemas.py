@@ -103,10 +103,12 @@ def _class(kind: Any) -> Schema:
 
 
 def _array(kinds: tuple[Any, ...]) -> Schema:
-    """Describes a tuple; all of its elements are of one type."""
+    """Describes a tuple."""
     if not kinds:
         return {"type": "array", "maxItems": 0}
-    schema: Schema = {"type": "array", "items": _schema(kinds[0])}
+    one_type = ... in kinds or all(kind == kinds[0] for kind in kinds)
+    schema: Schema = {"type": "array"}
+    schema |= {"items": _schema(kinds[0])} if one_type else {"prefixItems": [_schema(kind) for kind in kinds]}
     if ... not in kinds:
         schema |= {"minItems": len(kinds), "maxItems": len(kinds)}
     return schema

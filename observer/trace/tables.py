@@ -8,7 +8,7 @@ from typing import Any
 
 from observer.trace.read import Trace
 from shared.clock import NS_PER_S
-from shared.messages import Heard, Message
+from shared.messages import Heard, Lost, Message
 from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, rank, topic_of
 
 ALIGNED = "aligned.csv"
@@ -16,7 +16,10 @@ ALIGNED = "aligned.csv"
 
 _PERIOD_NS = round(NS_PER_S / HAND.rate_hz)
 _SIDE_BY_SIDE = (HAND, DRONE_STATE, FORMATION_STATE, PATTERN)
-_TECHNICAL = ("log_ns", "epoch", "seq", "stamp_ns", "id", "step_ns", "signature", "heard", "missing")
+_TECHNICAL = (
+    *("log_ns", "epoch", "seq", "stamp_ns", "id", "step_ns", "signature", "heard", "missing"),
+    *("unheard", "lost"),
+)
 
 Row = dict[str, Any]
 
@@ -142,7 +145,7 @@ def _flatten(name: str, value: Any, cells: Row) -> None:
     elif isinstance(value, tuple) and len(value) == 3 and all(isinstance(item, float) for item in value):
         cells.update({f"{name}_{axis}": item for axis, item in zip("xyz", value, strict=True)})
     elif isinstance(value, tuple):
-        cells[name] = " ".join(map(str, value))
+        cells[name] = " ".join(str(item.id if isinstance(item, Lost) else item) for item in value)
     elif isinstance(value, dict):
         for key, item in value.items():
             _flatten(f"{name}.{key}", item, cells)
