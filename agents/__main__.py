@@ -10,11 +10,11 @@ from agents.settings import agent_settings
 from agents.vehicles import open_vehicle
 from shared.bus import join
 from shared.clock import system_clock
-from shared.config import load_scenario, vehicle_settings
+from shared.config import vehicle_settings
 from shared.errors import SwarmTouchError
-from shared.formation import build_formation
 from shared.nodes import drone_node
 from shared.process import StatusReporter, add_process_arguments, explain, prepare_process
+from shared.scenario_check.check import check_drone, open_scenario
 from shared.topics import DRONE_STATE
 from shared.transport import Inbox
 
@@ -25,8 +25,8 @@ def main() -> int:
     stopping = prepare_process(f"drone/{args.id}", verbose=args.verbose)
     clock = system_clock()
     try:
-        scenario = load_scenario(args.scenario, args.set)
-        formation = build_formation(scenario, args.scenario)
+        scenario, formation = open_scenario(args.scenario, args.set)
+        check_drone(formation, args.id, args.scenario)
         settings = agent_settings(scenario, formation, args.id)
         agent = Agent(scenario, formation, args.id, settings, epoch=clock())
         vehicle = open_vehicle(str(vehicle_settings(scenario, args.id).uri))

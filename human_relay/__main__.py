@@ -11,12 +11,11 @@ from human_relay.sources.base import HandSource
 from human_relay.sources.takeover import open_takeover
 from shared.bus import join
 from shared.clock import system_clock
-from shared.config import load_scenario
 from shared.errors import SwarmTouchError
-from shared.formation import build_formation
 from shared.net.keyring import hand_signer
 from shared.nodes import RELAY
 from shared.process import add_process_arguments, explain, prepare_process
+from shared.scenario_check.check import open_scenario
 
 _EXAMPLE = """example: python -m human_relay --scenario rhombus --hand "scripted:tour?peak=0.4"
 Orders are lines on standard input: fly, hold, land, stop (stop is final)."""
@@ -28,8 +27,7 @@ def main() -> int:
     stopping = prepare_process(RELAY, verbose=arguments.verbose)
     clock = system_clock()
     try:
-        scenario = load_scenario(arguments.scenario, arguments.set)
-        formation = build_formation(scenario, arguments.scenario)
+        scenario, formation = open_scenario(arguments.scenario, arguments.set)
         with (
             join(scenario, formation, RELAY, audited=True) as bus,
             closing(_open_hand(arguments, clock())) as source,

@@ -14,7 +14,12 @@ def comb(number: int) -> tuple[str, ...]:
     """
     columns = -(-number // LENGTH)
     drones = ", ".join(_drone(drone, columns) for drone in range(1, number + 1))
-    return ('formation.shape="custom"', f"formation.drones=[{drones}]", "net.full_mesh=0")
+    return (
+        'formation.shape="custom"',
+        f"formation.n={number}",
+        f"formation.drones=[{drones}]",
+        "net.full_mesh=0",
+    )
 
 
 def _drone(drone: int, columns: int) -> str:

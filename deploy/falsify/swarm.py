@@ -20,11 +20,12 @@ from deploy.falsify.hand import poses, samples
 from deploy.lockstep.start import start_fleet
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.clock import NS_PER_S
-from shared.config import load_scenario, vehicle_settings
-from shared.formation import Formation, Vec, build_formation
+from shared.config import vehicle_settings
+from shared.formation import Formation, Vec
 from shared.messages import DroneState, HandSample, Mode, Vector
 from shared.nodes import neighbours
 from shared.scenario import Scenario
+from shared.scenario_check.check import open_scenario
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
@@ -52,13 +53,12 @@ class Flown:
 
 @lru_cache(maxsize=64)
 def prepare(scenario: str, overrides: tuple[str, ...]) -> tuple[Scenario, Formation]:
-    """Loads the scenario of a case and builds its formation.
+    """Opens the scenario of a case; agents in lockstep say what they say without a network.
 
     Raises:
         ConfigError: It is refused.
     """
-    loaded = load_scenario(scenario, overrides)
-    return loaded, build_formation(loaded, scenario)
+    return open_scenario(scenario, overrides, network=False)
 
 
 def fly(case: Case) -> Flown:

@@ -34,12 +34,13 @@ from observer.console.pattern_file import PATTERN_FILE
 from observer.swarm import SCENARIO_FILE
 from shared.bus import join
 from shared.clock import system_clock
-from shared.config import dump_scenario, load_scenario
+from shared.config import dump_scenario
 from shared.errors import ConfigError
-from shared.formation import Formation, build_formation
+from shared.formation import Formation
 from shared.nodes import OBSERVER, all_nodes
 from shared.pointer_link import LOOPBACK
 from shared.scenario import Scenario
+from shared.scenario_check.check import open_scenario
 
 SUMMARY_FILE = "summary.json"
 
@@ -117,8 +118,7 @@ def _resolve(options: Options) -> tuple[Scenario, Formation, HandChoice]:
     if options.glove:
         load_patterns(options.glove.patterns)
     hints = hint_overrides(source_hints(options.hand))
-    scenario = load_scenario(options.scenario, (*hints, *options.overrides))
-    formation = build_formation(scenario, options.scenario)
+    scenario, formation = open_scenario(options.scenario, (*hints, *options.overrides))
     tcp_ports, (udp_port, pointer_port) = free_ports(tcp=len(all_nodes(formation)), udp=2)
     hand = choose_hand(options.hand, scenario, console=options.console, free_port=pointer_port)
     return resolve_scenario(scenario, formation, tcp_ports, udp_port, hand.pointer_port), formation, hand

@@ -153,14 +153,17 @@ def resolve_scenario(
     nodes = zip(all_nodes(formation), tcp_ports, strict=True)
     free = {node: loopback(scenario.net, port) for node, port in nodes}
     everyone = scenario.vehicles.all
+    multicast = scenario.net.multicast
+    if scenario.net.profile == "radio" and not multicast:
+        # The number is free: on a radio the relay, first of all nodes, listens on no port of its own.
+        multicast = f"{GROUP}:{tcp_ports[0]}"
     uri = everyone.uri or f"sim://127.0.0.1:{udp_port}/{{id}}"
     return attrs.evolve(
         scenario,
         net=attrs.evolve(
             scenario.net,
-            endpoints={**free, **scenario.net.endpoints},
-            # The number is free: on a radio the relay, first of all nodes, listens on no port of its own.
-            multicast=scenario.net.multicast or f"{GROUP}:{tcp_ports[0]}",
+            endpoints={} if scenario.net.router else {**free, **scenario.net.endpoints},
+            multicast=multicast,
             pointer_port=pointer_port,
         ),
         vehicles=attrs.evolve(scenario.vehicles, all=attrs.evolve(everyone, uri=uri)),

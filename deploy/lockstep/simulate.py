@@ -14,9 +14,8 @@ from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.picture import draw
 from deploy.lockstep.record import Record, judge, tracking_rms, write_csv
 from human_relay.sources import source_hints
-from shared.config import load_scenario
-from shared.formation import build_formation
 from shared.scenario import Scenario
+from shared.scenario_check.check import open_scenario
 
 CENTRAL = "central"
 """One computer for all drones, instead of one agent per drone."""
@@ -56,8 +55,7 @@ def simulate(options: Options) -> dict[str, Any]:
     """
     law = [f"swarm.law={options.law}"] if options.law not in (None, CENTRAL) else []
     hints = hint_overrides(source_hints(options.hand))
-    scenario = load_scenario(options.scenario, (*hints, *law, *options.overrides))
-    formation = build_formation(scenario, options.scenario)
+    scenario, formation = open_scenario(options.scenario, (*hints, *law, *options.overrides), network=False)
     samples = relayed(options.hand, options.seconds, scenario.rates.control_hz)
     started = time.perf_counter()
     fly = fly_batched if options.law == CENTRAL else fly_lockstep

@@ -12,11 +12,11 @@ from agents.vehicles.world.setup import plan_world
 from agents.vehicles.world.world import World
 from shared.bus import join
 from shared.clock import system_clock
-from shared.config import load_scenario
 from shared.errors import SwarmTouchError
 from shared.net.keyring import hand_verifier
 from shared.nodes import WORLD
 from shared.process import StatusReporter, add_process_arguments, explain, prepare_process
+from shared.scenario_check.check import open_scenario
 
 
 def main() -> int:
@@ -31,7 +31,7 @@ def main() -> int:
     arguments = parser.parse_args()
     stopping = prepare_process("world", verbose=arguments.verbose)
     try:
-        scenario = load_scenario(arguments.scenario, arguments.set)
+        scenario, _ = open_scenario(arguments.scenario, arguments.set)
         setup = plan_world(scenario)
         radio = Radio(setup.address, setup.fleet.ids, setup.hovers)
         verify = hand_verifier(scenario.net)
