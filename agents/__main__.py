@@ -13,7 +13,7 @@ from shared.clock import system_clock
 from shared.config import vehicle_settings
 from shared.errors import SwarmTouchError
 from shared.nodes import drone_node
-from shared.process import StatusReporter, add_process_arguments, explain, prepare_process
+from shared.process import StatusReporter, add_process_arguments, explain, prepare_process, tell_form
 from shared.scenario_check.check import check_drone, open_scenario
 from shared.topics import DRONE_STATE
 from shared.transport import Inbox
@@ -40,7 +40,8 @@ def main() -> int:
         publish = bus.publisher(DRONE_STATE, id=args.id)
         # What starting up has left never dies: the collector need not look through it in flight.
         gc.freeze()
-        run(agent, vehicle, inbox, publish, StatusReporter(bus, "drone", args.id, clock), clock, stopping)
+        status = StatusReporter(bus, "drone", args.id, clock, tell_form())
+        run(agent, vehicle, inbox, publish, status, clock, stopping)
         vehicle.close()
     return 0
 

@@ -234,6 +234,7 @@ class ProcessStatus(Message, frozen=True, kw_only=True):
         rate_hz: Steps per second over the last second.
         cpu: Fraction of one core over the last second.
         rss_mb: Resident memory, MB.
+        form: Form of the law that it runs, `pure` or `compiled 3f2a91c0`; empty if it runs none.
         rejected: Dropped messages by reason since the start.
         metrics: Further numbers of this role (for example the referee's distances).
     """
@@ -243,6 +244,7 @@ class ProcessStatus(Message, frozen=True, kw_only=True):
     pid: UInt64
     host: str
     state: str
+    form: str = ""
     rate_hz: Seconds = 0.0
     cpu: Seconds = 0.0
     rss_mb: Seconds = 0.0

@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
+from shared.compiled import form
 from shared.errors import ConfigError, SwarmTouchError
 from shared.messages import ProcessStatus
 from shared.topics import STATUS
@@ -34,6 +35,8 @@ _PR_SET_PDEATHSIG = 1
 _M_ARENA_MAX = -8
 _SWITCH_INTERVAL_S = 0.0005
 _STATUS_PERIOD_NS = NS_PER_S
+
+_log = logging.getLogger("process")
 
 
 def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
@@ -98,6 +101,16 @@ def explain(program: str, error: SwarmTouchError) -> int:
     return EXIT_REFUSED if isinstance(error, ConfigError) else EXIT_FAILED
 
 
+def tell_form() -> str:
+    """Logs, and returns, the form in which this process runs the law; says why if a compiled one is no good."""
+    used = form()
+    if used.refused:
+        _log.warning("law %s: %s", used, used.reason)
+    else:
+        _log.info("law %s", used)
+    return str(used)
+
+
 class ResourceMeter:
     """Measures the CPU and memory use of this process."""
 
@@ -121,11 +134,12 @@ class StatusReporter:
         role: Role of this process.
         number: Number within the role.
         clock: The process's clock.
+        law: Form of the law that this process runs, empty if it runs none.
     """
 
-    def __init__(self, bus: Bus, role: str, number: int, clock: Clock) -> None:
+    def __init__(self, bus: Bus, role: str, number: int, clock: Clock, law: str = "") -> None:
         self._publish = bus.publisher(STATUS, role=role, id=number)
-        self._role, self._number, self._clock = role, number, clock
+        self._role, self._number, self._clock, self._law = role, number, clock, law
         self._epoch = clock()
         self._seq = 0
         self._due_ns = self._last_ns = self._epoch
@@ -167,6 +181,7 @@ class StatusReporter:
             pid=os.getpid(),
             host=socket.gethostname(),
             state=state,
+            form=self._law,
             rate_hz=(steps - self._steps) / elapsed,
             cpu=cpu,
             rss_mb=rss_mb,

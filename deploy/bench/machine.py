@@ -6,6 +6,8 @@ import resource
 from importlib.metadata import version
 from pathlib import Path
 
+from shared.compiled import form
+
 SHORTEST_S = 0.1
 """The kernel counts in hundredths of a second: within less time one of them would look like a busy core, s."""
 
@@ -31,12 +33,17 @@ class Conditions:
         others = busy - self._busy - (_own_s() - self._own)
         return max(0.0, others) / seconds
 
+    def facts(self) -> dict[str, str | float | None]:
+        """Returns what every line of JSON says beside its numbers."""
+        return {"form": str(form()), "others_cores": self.others_cores()}
+
     def text(self) -> str:
-        """Returns cores, system, versions and the load of others, in one line."""
+        """Returns cores, system, versions, the form of the law and the load of others, in one line."""
         others = self.others_cores()
         return (
             f"{os.cpu_count()} cores, {platform.system()} {platform.machine()},"
-            f" Python {platform.python_version()}, Zenoh {version('eclipse-zenoh')}, NumPy {version('numpy')}"
+            f" Python {platform.python_version()}, law {form()},"
+            f" Zenoh {version('eclipse-zenoh')}, NumPy {version('numpy')}"
             + ("" if others is None else f"; other processes used {others:.2f} cores meanwhile")
         )
 

@@ -3,8 +3,10 @@
 import argparse
 import importlib
 from collections.abc import Sequence
+from importlib.metadata import version
 from typing import Protocol, cast
 
+from shared.compiled import form
 from shared.errors import SwarmTouchError
 from shared.process import explain
 
@@ -59,6 +61,9 @@ def _parser() -> argparse.ArgumentParser:
         description="Guide a formation of small drones with one hand.",
         epilog="example: swarmtouch up rhombus --seconds 30",
     )
+    parser.add_argument(
+        "--version", action=_Version, help="say which version, and which form of the law, this is"
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
         command = _load(name)
@@ -71,6 +76,19 @@ def _parser() -> argparse.ArgumentParser:
         )
         command.add_arguments(child)
     return parser
+
+
+class _Version(argparse.Action):
+    """Looks for the version only when it is asked for."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, help: str) -> None:  # noqa: A002  argparse's
+        super().__init__(option_strings, dest, nargs=0, default=argparse.SUPPRESS, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Prints it and ends the program."""
+        law = form()
+        print(f"{parser.prog} {version(parser.prog)}, law {law} ({law.compiler or law.reason})")
+        parser.exit()
 
 
 def _load(name: str) -> Command:

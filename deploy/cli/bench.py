@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_block(report, met, arguments.update)
     if arguments.json:
         for record in report.records:
-            print(json.dumps(record | {"others_cores": conditions.others_cores()}), flush=True)
+            print(json.dumps(record | conditions.facts()), flush=True)
     return 0
 
 

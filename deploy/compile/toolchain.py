@@ -7,7 +7,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
-COST = "a control step takes about three times as long, simulators run at a quarter of their speed"
+COST = "a control step takes three times as long, a simulation four"
 """What the pure form costs (docs/performance.md)."""
 
 

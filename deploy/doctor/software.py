@@ -5,7 +5,9 @@ import re
 import sys
 from collections.abc import Iterable, Iterator
 
+from deploy.compile.toolchain import COST, missing
 from deploy.doctor.finding import Finding, bad, good, warning
+from shared.compiled import PURE, ROOT, Form, form
 
 OLDEST_PYTHON = (3, 11)
 _NAME = "swarmtouch"
@@ -48,6 +50,24 @@ def check_packages() -> Iterator[Finding]:
             yield good(f"extra {extra}", purpose)
 
 
+def check_law(law: Form) -> Finding:
+    """Looks in which form the law would fly from here.
+
+    Args:
+        law: Of this process.
+    """
+    subject = "control law"
+    if law.digest:
+        return good(subject, f"{law} by {law.compiler}")
+    found = f"{law}: {law.reason}; {COST}"
+    if law.reason.startswith(PURE):
+        return warning(subject, found, f"unset {PURE}")
+    how = (
+        "make compile" if (ROOT / "Makefile").exists() else "pip install again, from source or a compiled wheel"
+    )
+    return warning(subject, found, "; ".join([*missing(), how]))
+
+
 def _missing(requirements: Iterable[str], extra: str | None) -> list[str]:
     parsed = (match.groups() for line in requirements if (match := _REQUIREMENT.match(line)))
     return [name for name, of in parsed if of == extra and not _is_installed(name)]
@@ -65,3 +85,4 @@ def all_software() -> Iterator[Finding]:
     """Yields every finding about software."""
     yield check_python()
     yield from check_packages()
+    yield check_law(form())

@@ -34,6 +34,7 @@ from observer.console.pattern_file import PATTERN_FILE
 from observer.swarm import SCENARIO_FILE
 from shared.bus import join
 from shared.clock import system_clock
+from shared.compiled import form
 from shared.config import dump_scenario
 from shared.errors import ConfigError
 from shared.formation import Formation
@@ -154,6 +155,8 @@ async def _fly(
     ):
         if page:
             view.event(f"fly it in the browser: {_page_address(page.port)}")
+        if form().refused:
+            view.event(f"the law flies in its {form()} form: {form().reason}; swarmtouch doctor says more")
         monitor = Monitor(bus, formation, system_clock())
         flight = Flight(
             formation=formation,

@@ -14,6 +14,7 @@ from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.picture import draw
 from deploy.lockstep.record import Record, judge, tracking_rms, write_csv
 from human_relay.sources import source_hints
+from shared.compiled import form
 from shared.scenario import Scenario
 from shared.scenario_check.check import open_scenario
 
@@ -48,7 +49,8 @@ def simulate(options: Options) -> dict[str, Any]:
     """Simulates one flight from a hover in the rest formation.
 
     Returns:
-        The summary: drones, seconds, realtime_factor, the referee's distances and counts, tracking_rms_m.
+        The summary: drones, seconds, realtime_factor, form of the law, the referee's distances and counts,
+        tracking_rms_m.
 
     Raises:
         ConfigError: The scenario or the hand is refused, or a plot cannot be made.
@@ -76,6 +78,7 @@ def _summary(record: Record, scenario: Scenario, took_s: float) -> dict[str, Any
         "drones": len(ids),
         "seconds": seconds,
         "realtime_factor": seconds / took_s,
+        "form": str(form()),
         "min_distance_m": verdict.get("min_distance_m"),
         "min_hand_distance_m": verdict.get("min_hand_distance_m"),
         "collisions": verdict["collisions"],

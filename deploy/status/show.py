@@ -7,13 +7,13 @@ from rich.table import Table
 
 from deploy.status.report import Row
 
-_LEFT = ("process", "mode", "how it is")
+_LEFT = ("process", "mode", "law", "how it is")
 
 
 def status_table(rows: list[Row], title: str) -> Table:
     """Draws one row per process."""
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0)
-    for name in ("process", "mode", "height", "rate", "cpu", "memory", "rejected", "how it is"):
+    for name in ("process", "mode", "height", "rate", "cpu", "memory", "law", "rejected", "how it is"):
         table.add_column(name, justify="left" if name in _LEFT else "right", no_wrap=name != "how it is")
     for row in rows:
         table.add_row(*_cells(row), style=None if row.well else "red")
@@ -46,6 +46,7 @@ def status_json(rows: list[Row]) -> list[dict[str, Any]]:
             "rate_hz": row.heard.status.rate_hz if row.heard.status else None,
             "cpu": row.heard.status.cpu if row.heard.status else None,
             "rss_mb": row.heard.status.rss_mb if row.heard.status else None,
+            "form": row.heard.status.form if row.heard.status else None,
             "links": row.links,
             "refused": row.refused,
         }
@@ -62,6 +63,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         f"{status.rate_hz:.0f} Hz" if status else "-",
         f"{status.cpu:.0%}" if status else "-",
         f"{status.rss_mb:.0f} MB" if status else "-",
+        status.form.removeprefix("compiled ") if status else "-",
         str(sum(status.rejected.values())) if status else "-",
         ", ".join(row.problems) or "well",
     )

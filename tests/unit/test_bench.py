@@ -27,6 +27,7 @@ from deploy.bench.usage import read_usage
 from deploy.cli import main
 from deploy.launcher.process_table import resolve_scenario
 from deploy.lockstep.lockstep import Lockstep
+from shared.compiled import form
 from shared.config import load_scenario
 from shared.errors import ConfigError
 from shared.formation import build_formation
@@ -159,13 +160,15 @@ def test_usage_grows_with_work_and_with_sleep() -> None:
 
 @needs_proc
 def test_conditions_say_how_busy_others_were(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("deploy.bench.machine._uptime", iter((100.0, 100.05, *[200.0] * 3)).__next__)
+    monkeypatch.setattr("deploy.bench.machine._uptime", iter((100.0, 100.05, *[200.0] * 5)).__next__)
     conditions = Conditions()
     assert conditions.others_cores() is None, "too short to tell"
     others = conditions.others_cores()
     assert others is not None
     assert 0.0 <= others <= (os.cpu_count() or 1) + 1.0
     assert "Zenoh" in conditions.text()
+    assert f"law {form()}" in conditions.text()
+    assert conditions.facts()["form"] == str(form())
     assert "other processes used" in conditions.text()
 
 

@@ -3,11 +3,13 @@
 import importlib
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 from deploy.cli import COMMANDS, main
+from shared.compiled import form
 from shared.config import SCENARIOS
 
 
@@ -39,6 +41,13 @@ def test_help_loads_neither_the_bus_nor_numpy() -> None:
         "sys.exit(bool({'zenoh', 'numpy', 'rich'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL, check=False).returncode == 0
+
+
+def test_the_version_says_which_form_of_the_law_flies(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.startswith(f"swarmtouch {version('swarmtouch')}, law {form()} (")
 
 
 def test_scenarios_lists_what_ships_with_its_first_comment(capsys: pytest.CaptureFixture[str]) -> None:

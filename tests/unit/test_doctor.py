@@ -11,8 +11,10 @@ import pytest
 from serial.tools import list_ports
 
 from deploy.cli import main
+from deploy.compile.toolchain import COST
 from deploy.doctor import hardware, network, software
 from deploy.doctor.finding import Finding, Verdict
+from shared.compiled import PURE, Form
 from shared.config import load_scenario
 
 
@@ -23,7 +25,32 @@ def verdicts(findings: Iterable[Finding]) -> list[Verdict]:
 
 
 def test_this_python_and_its_packages_are_good() -> None:
-    assert set(verdicts(software.all_software())) == {Verdict.GOOD}
+    findings = [finding for finding in software.all_software() if finding.subject != "control law"]
+    assert set(verdicts(findings)) == {Verdict.GOOD}
+
+
+def test_a_compiled_law_is_good() -> None:
+    law = Form("3f2a91c0d1e2f3a4", "mypyc 2.4.1 -O3")
+    finding = software.check_law(law)
+    assert (finding.verdict, finding.advice) == (Verdict.GOOD, "")
+    assert finding.found == "compiled 3f2a91c0 by mypyc 2.4.1 -O3"
+
+
+@pytest.mark.parametrize("law", [Form(reason="not compiled for cpython"), Form(reason="damaged", refused=True)])
+def test_a_pure_law_says_why_what_it_costs_and_what_is_missing(
+    law: Form, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    finding = software.check_law(law)
+    assert finding.verdict is Verdict.WARNING
+    assert law.reason in finding.found
+    assert COST in finding.found
+    assert "no-such-compiler" in finding.advice
+    assert "make compile" in finding.advice
+
+
+def test_a_law_that_was_asked_to_be_pure_needs_no_compiler() -> None:
+    assert software.check_law(Form(reason=f"{PURE} is set")).advice == f"unset {PURE}"
 
 
 def test_an_old_python_is_bad() -> None:

@@ -10,8 +10,13 @@ from pathlib import Path
 import pytest
 
 from shared.clock import system_clock
+from shared.codec import decode
+from shared.compiled import form
 from shared.memory_bus import MemoryBus, MemoryNetwork
-from shared.process import OVERRIDES, SCENARIO, StatusReporter, add_process_arguments
+from shared.messages import ProcessStatus
+from shared.process import OVERRIDES, SCENARIO, StatusReporter, add_process_arguments, tell_form
+from shared.topics import STATUS
+from shared.transport import Inbox
 from shared.watchdog import NOTIFY_SOCKET, feed_watchdog
 
 
@@ -82,6 +87,16 @@ def test_every_status_feeds_the_watchdog(manager: socket.socket) -> None:
         status.tick(1)
         with pytest.raises(BlockingIOError):
             manager.recv(100)  # the second has not passed yet
+
+
+def test_a_status_says_which_form_of_the_law_runs() -> None:
+    network, clock = MemoryNetwork(), system_clock()
+    heard = Inbox(clock)
+    MemoryBus(network).subscribe(STATUS.wildcard, heard)
+    StatusReporter(MemoryBus(network), "drone", 1, clock, tell_form()).tick(0)
+    StatusReporter(MemoryBus(network), "relay", 0, clock).tick(0)
+    said = {key: decode(arrivals[-1].payload, ProcessStatus).form for key, arrivals in heard.take().items()}
+    assert said == {STATUS.key(role="drone", id=1): str(form()), STATUS.key(role="relay", id=0): ""}
 
 
 def test_an_abstract_socket_is_fed(monkeypatch: pytest.MonkeyPatch) -> None:

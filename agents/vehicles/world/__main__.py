@@ -15,7 +15,7 @@ from shared.clock import system_clock
 from shared.errors import SwarmTouchError
 from shared.net.keyring import hand_verifier
 from shared.nodes import WORLD
-from shared.process import StatusReporter, add_process_arguments, explain, prepare_process
+from shared.process import StatusReporter, add_process_arguments, explain, prepare_process, tell_form
 from shared.scenario_check.check import open_scenario
 
 
@@ -40,7 +40,7 @@ def main() -> int:
         return explain("world", error)
     clock = system_clock()
     with radio, bus, RefereeFile(arguments.run_dir) as report:
-        hand, status = HandWatch(bus, clock, verify), StatusReporter(bus, WORLD, 0, clock)
+        hand, status = HandWatch(bus, clock, verify), StatusReporter(bus, WORLD, 0, clock, tell_form())
         world = World(setup.fleet, radio, setup.rules, time.monotonic(), setup.faults)
         while not stopping.wait(max(0.0, world.next_tick - time.monotonic())):
             world.run_until(time.monotonic(), hand.position())
