@@ -93,7 +93,7 @@ class Bridge:
     def presence_changed(self, token: str, present: bool, now_ns: int) -> None:
         """Takes in that a process came or left, for example `drone/2`: quicker than waiting for silence."""
         role, _, number = token.partition("/")
-        if role == "drone" and number.isdecimal() and not present:
+        if role == "drone" and not present:
             self._left_ns[int(number)] = now_ns
 
     def step(self, now_ns: int) -> Step:

@@ -4,7 +4,7 @@ import math
 
 from attrs import frozen
 
-from observer.hand_log import HandLog
+from observer.hand_log import KEPT, HandLog
 from observer.histogram import Histogram, Quantiles
 from observer.through import HAND_KEY, newest_through
 from shared.clock import NS_PER_S
@@ -73,14 +73,14 @@ class AgentLog:
         """Counts one state.
 
         Args:
-            state: The next state; late and repeated ones are ignored.
+            state: The next state; late and repeated ones are ignored, see `HandLog.add`.
             hands: Every hand sample up to now.
             agents: The logs of all agents; those of the references must be up to date.
         """
         if HAND_KEY not in state.heard or self._is_old(state):
             return
         previous = self._previous
-        if previous is None or previous.epoch != state.epoch:
+        if previous is None or previous.epoch != state.epoch or previous.seq > state.seq:
             previous = None
             self._use.start_epoch()
         self._count_step(state, previous)
@@ -113,7 +113,9 @@ class AgentLog:
 
     def _is_old(self, state: DroneState) -> bool:
         last = self._previous
-        return last is not None and (state.epoch, state.seq) <= (last.epoch, last.seq)
+        if last is None or (state.epoch, state.seq) > (last.epoch, last.seq):
+            return False
+        return state.epoch < last.epoch or last.seq - state.seq <= KEPT
 
     def _count_step(self, state: DroneState, previous: DroneState | None) -> None:
         self._received += 1

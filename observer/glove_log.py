@@ -4,6 +4,7 @@ from collections import Counter
 
 from observer.histogram import Histogram
 from shared.messages import PatternEvent
+from shared.plain_text import plain
 from shared.topics import DRONE_STATE
 
 _DRONE = DRONE_STATE.pattern.split("{", maxsplit=1)[0]
@@ -40,12 +41,13 @@ class GloveLog:
             "suppressed": self.suppressed,
             "failed": self.failed,
         }
+        name = plain(event.pattern)
         if event.outcome in counts:
-            counts[event.outcome][event.pattern] += 1
+            counts[event.outcome][name] += 1
         if event.outcome == "started":
             self._add_latency(event)
         if event.outcome == "failed" and event.started_ns == 0:
-            self.lost[event.pattern] += 1
+            self.lost[name] += 1
         if event.outcome != "suppressed":
             self.latest = event
 

@@ -21,12 +21,19 @@ class HandLog:
         self._stamps: list[int] = []
 
     def add(self, sample: HandSample) -> None:
-        """Takes the next sample; late and repeated ones are ignored."""
+        """Takes the next sample; late and repeated ones are ignored.
+
+        One that is further back than any that is late is where the relay really is: what was there before came
+        out of the future (`shared.order`).
+        """
         if sample.epoch not in self._first:
             self._first[sample.epoch] = self._numbers[-1] + 1 if self._numbers else 0
         number = self._first[sample.epoch] + sample.seq
         if self._numbers and number <= self._numbers[-1]:
-            return
+            if self._numbers[-1] - number <= KEPT:
+                return
+            number = self._numbers[-1] + 1
+            self._first[sample.epoch] = number - sample.seq
         self._numbers.append(number)
         self._stamps.append(sample.stamp_ns)
         if len(self._numbers) > 2 * KEPT:

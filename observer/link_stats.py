@@ -6,6 +6,7 @@ used and when those had arrived. Loss and rates are judged by `(epoch, seq)` and
 by what an observer's own queue happened to hold.
 """
 
+import contextlib
 import math
 from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Mapping
@@ -14,10 +15,16 @@ from attrs import frozen
 
 from observer.histogram import Histogram, Quantiles
 from shared.clock import NS_PER_S
+from shared.errors import DecodeError
 from shared.messages import DroneState, FormationState, Heard, Message, ProcessStatus
 from shared.nodes import OBSERVER
-from shared.topics import rank
+from shared.order import AHEAD, check_newer
+from shared.topics import parse_key, rank
 
+OTHER_KEYS = "other keys"
+"""Stands for every key that is of no topic."""
+_STALE_S = 2.0
+"""A publisher that goes on further back after so long a silence has been restored, and is not late."""
 _REMEMBERED = 1024
 """Recent samples of a key whose stamps are known, and recent gaps that a late sample may still fill."""
 
@@ -68,15 +75,18 @@ class LinkStats:
         Args:
             sample: Which one, and when it arrived.
             stamp_ns: When it was sent, None if unknown.
+
+        Raises:
+            DecodeError: `ahead`: its number is out of the future, and nothing of it is counted.
         """
+        last, late = self._last, self._is_late(sample)
         self._messages += 1
         if stamp_ns is not None:
             self._age.add(max(0, sample.arrival_ns - stamp_ns) / 1e6)
-        last = self._last
-        if last is not None and sample[:2] <= last[:2]:
+        if late:
             self._count_late(sample)
             return
-        if last is not None and last.epoch == sample.epoch:
+        if last is not None and last.epoch == sample.epoch and last.seq < sample.seq:
             self._count_advance(last, sample, stamp_ns)
         self._last, self._last_stamp_ns = sample, stamp_ns
 
@@ -98,6 +108,17 @@ class LinkStats:
             age_ms=self._age.quantiles(),
             last_ns=self._last.arrival_ns if self._last else 0,
         )
+
+    def _is_late(self, sample: Heard) -> bool:
+        if self._last is None:
+            return False
+        try:
+            check_newer(sample, self._last, _STALE_S)
+        except DecodeError as error:
+            if error.reason == AHEAD:
+                raise
+            return True
+        return False
 
     def _count_late(self, sample: Heard) -> None:
         """A sample that was counted as lost has come after all, or one has come twice."""
@@ -136,11 +157,16 @@ class SwarmLinks:
 
     def add(self, key: str, message: Message, arrival_ns: int) -> None:
         """Counts one valid message; what it says it heard must have been added before, to have an age."""
+        sample = Heard(message.epoch, message.seq, arrival_ns)
+        try:
+            self._link(key, OBSERVER).add(sample, message.stamp_ns)
+        except DecodeError as error:
+            self.reject(key, error.reason)
+            return
         stamps = self._stamps[key]
         stamps[message.epoch, message.seq] = message.stamp_ns
         if len(stamps) > _REMEMBERED:
             del stamps[next(iter(stamps))]
-        self._link(key, OBSERVER).add(Heard(message.epoch, message.seq, arrival_ns), message.stamp_ns)
         if isinstance(message, DroneState):
             self._add_heard(f"drone/{message.id}", message.heard)
         elif isinstance(message, FormationState):
@@ -149,9 +175,13 @@ class SwarmLinks:
             self.processes[f"{message.role}/{message.id}"] = message
 
     def reject(self, key: str, reason: str) -> None:
-        """Counts one payload that is no valid message; its link has a row, be it without messages."""
-        self.rejected[key][reason] += 1
-        self._link(key, OBSERVER)
+        """Counts one payload that is no valid message; its link has a row, be it without messages.
+
+        Those on keys of no topic share one: anybody may make up any number of them.
+        """
+        shown = key if _is_ours(key) else OTHER_KEYS
+        self.rejected[shown][reason] += 1
+        self._link(shown, OBSERVER)
 
     def rows(self) -> list[LinkSummary]:
         """Returns the observer's links in the order of the table of topics, then everybody else's."""
@@ -160,10 +190,26 @@ class SwarmLinks:
 
     def _add_heard(self, listener: str, heard: Mapping[str, Heard]) -> None:
         for key, sample in heard.items():
-            self._link(key, listener).uses(sample, self._stamps[key].get((sample.epoch, sample.seq)))
+            if not _is_ours(key):
+                continue
+            stamps = self._stamps.get(key, {})
+            # Numbers that its listener makes up are no reason to doubt the message.
+            with contextlib.suppress(DecodeError):
+                self._link(key, listener).uses(sample, stamps.get((sample.epoch, sample.seq)))
 
     def _link(self, key: str, listener: str) -> LinkStats:
-        return self._links.setdefault((key, listener), LinkStats())
+        link = self._links.get((key, listener))
+        if link is None:
+            link = self._links[key, listener] = LinkStats()
+        return link
+
+
+def _is_ours(key: str) -> bool:
+    try:
+        parse_key(key)
+    except DecodeError:
+        return False
+    return True
 
 
 class _Deviation:

@@ -24,10 +24,10 @@ os.environ.setdefault(
 import zenoh
 
 from shared.clock import system_clock
-from shared.errors import DeviceError
+from shared.errors import DecodeError, DeviceError
 from shared.formation import Formation
 from shared.net.access import presence, writes
-from shared.net.audit import LOG_FILTER, Audit
+from shared.net.audit import LOG_FILTER, REFUSED, Audit
 from shared.net.keyring import Keyring
 from shared.net.linger import stop_lingering
 from shared.net.log_tap import tap_stdout
@@ -36,7 +36,7 @@ from shared.nodes import RELAY
 from shared.radio import Receiver, Transmitter
 from shared.radio_link import radio_group
 from shared.scenario import Scenario
-from shared.topics import ALIVE, Delivery, Topic
+from shared.topics import ALIVE, Delivery, Topic, parse_presence
 from shared.transport import Bus, Inbox, Publish
 
 CLOSE_TIMEOUT_S = 1.0
@@ -77,6 +77,7 @@ class ZenohBus:
         self._declared: list[Any] = []
         self._radio = radio
         self._audit: Audit | None = None
+        self._foreign_tokens = 0
         try:
             self._session = _open(settings)
         except DeviceError:
@@ -101,8 +102,12 @@ class ZenohBus:
 
     def audit(self) -> dict[str, float]:
         """See `Bus.audit`."""
-        mesh = self._audit.metrics() if self._audit else {}
-        return mesh | self._radio.audit() if self._radio else mesh
+        told = self._audit.metrics() if self._audit else {}
+        if self._radio:
+            told |= self._radio.audit()
+        if self._foreign_tokens:
+            told[f"{REFUSED}tokens of no process"] = float(self._foreign_tokens)
+        return told
 
     def publisher(self, topic: Topic, **parts: object) -> Publish:
         """See `Bus.publisher`."""
@@ -112,11 +117,11 @@ class ZenohBus:
 
     def subscribe(self, key_expression: str, inbox: Inbox) -> None:
         """See `Bus.subscribe`; the callback stores bytes, what else it does is up to the inbox."""
-        fixed = None if "*" in key_expression else key_expression
 
         def store(sample: zenoh.Sample) -> None:
             _stay_known()
-            inbox.put(fixed or str(sample.key_expr), sample.payload.to_bytes())
+            # The key that it was put on, be it `**`: whoever takes it judges the key like the payload.
+            inbox.put(str(sample.key_expr), sample.payload.to_bytes())
 
         # On Zenoh's own thread: handing over to a Python thread per subscription would cost a wake-up each.
         handler = zenoh.handlers.Callback(store, indirect=False)
@@ -134,7 +139,12 @@ class ZenohBus:
         """See `Bus.watch_presence`."""
 
         def changed(sample: zenoh.Sample) -> None:
-            on_change(str(sample.key_expr).removeprefix(_ALIVE_PREFIX), sample.kind == zenoh.SampleKind.PUT)
+            try:
+                token = parse_presence(str(sample.key_expr))
+            except DecodeError:
+                self._foreign_tokens += sample.kind == zenoh.SampleKind.PUT
+                return
+            on_change(token, sample.kind == zenoh.SampleKind.PUT)
 
         watcher = self._session.liveliness().declare_subscriber(f"{_ALIVE_PREFIX}**", changed, history=True)
         self._declared.append(watcher)

@@ -18,7 +18,8 @@ from cattrs import Converter
 from msgspec import structs
 
 from shared.errors import DecodeError
-from shared.messages import SCHEMA_VERSION, Flag, Message, Mode, Wish
+from shared.messages import SCHEMA_VERSION, DroneState, Flag, Message, Mode, ProcessStatus, Wish
+from shared.topics import parse_key
 
 MAX_PAYLOAD = 4096
 """Largest payload in bytes that is looked at at all."""
@@ -62,6 +63,23 @@ def decode(payload: bytes, kind: type[M]) -> M:
         raise DecodeError("oversized", f"{len(payload)} bytes, at most {MAX_PAYLOAD}")
     message = decode_valid(payload, kind)
     return decode_strictly(payload, kind) if message is None else message
+
+
+def decode_on(key: str, payload: bytes) -> Message:
+    """Decodes what came on a key, and checks that it speaks for whom the key belongs to.
+
+    Access rules bind a node to keys, so a payload never says who it is from: where it does, it must agree.
+
+    Raises:
+        DecodeError: Nobody would accept it: an unknown key, no valid message, or another one's (`wrong-id`).
+    """
+    place = parse_key(key)
+    message = decode(payload, place.topic.kind)
+    if isinstance(message, DroneState) and message.id != place.id:
+        raise DecodeError("wrong-id", f"drone {message.id} on {key}")
+    if isinstance(message, ProcessStatus) and (message.role, message.id) != place[1:]:
+        raise DecodeError("wrong-id", f"{message.role!r:.40} {message.id} on {key}")
+    return message
 
 
 class _Envelope(msgspec.Struct):

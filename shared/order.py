@@ -8,6 +8,9 @@ FASTEST_HZ = 1000
 AT_ONCE = 256
 """... but what was held up comes together, and clocks drift."""
 
+AHEAD, LATE = "ahead", "out-of-order"
+"""Why a sample is refused."""
+
 Sample = tuple[int, int, int]
 """(epoch, seq, arrival in ns on the own clock), as `shared.messages.Heard` is one."""
 
@@ -31,8 +34,8 @@ def check_newer(sample: Sample, last: Sample, stale_s: float) -> None:
     last_epoch, last_seq, last_ns = last
     if epoch == last_epoch and seq > last_seq:
         if seq - last_seq > AT_ONCE and (seq - last_seq - AT_ONCE) * NS_PER_S > (now_ns - last_ns) * FASTEST_HZ:
-            raise DecodeError("ahead", f"number {seq} {(now_ns - last_ns) / NS_PER_S:.3f} s after {last_seq}")
+            raise DecodeError(AHEAD, f"number {seq} {(now_ns - last_ns) / NS_PER_S:.3f} s after {last_seq}")
         return
     if epoch > last_epoch or ((epoch, seq) != last[:2] and now_ns - last_ns > stale_s * NS_PER_S):
         return
-    raise DecodeError("out-of-order", f"({epoch}, {seq}) after ({last_epoch}, {last_seq})")
+    raise DecodeError(LATE, f"({epoch}, {seq}) after ({last_epoch}, {last_seq})")

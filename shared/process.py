@@ -17,6 +17,7 @@ from shared.codec import encode
 from shared.compiled import form
 from shared.errors import ConfigError, SwarmTouchError
 from shared.messages import ProcessStatus
+from shared.plain_text import plain
 from shared.topics import STATUS
 from shared.transport import Bus
 from shared.watchdog import feed_watchdog
@@ -35,6 +36,7 @@ _PR_SET_PDEATHSIG = 1
 _M_ARENA_MAX = -8
 _SWITCH_INTERVAL_S = 0.0005
 _STATUS_PERIOD_NS = NS_PER_S
+_LONGEST_LINE = 4000
 
 _log = logging.getLogger("process")
 
@@ -52,11 +54,10 @@ def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
         An event that SIGTERM or SIGINT sets; the loop ends when it is set.
     """
     _share_one_arena()
-    logging.basicConfig(
-        level=logging.DEBUG if verbose else logging.INFO,
-        format=f"%(asctime)s.%(msecs)03d {name} %(levelname)s %(name)s: %(message)s",
-        datefmt="%H:%M:%S",
-    )
+    line = f"%(asctime)s.%(msecs)03d {name} %(levelname)s %(name)s: %(message)s"
+    handler = logging.StreamHandler()
+    handler.setFormatter(_OneLine(line, datefmt="%H:%M:%S"))
+    logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, handlers=[handler])
     # The default of 5 ms would let a busy thread delay every received sample by as much.
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     stopping = threading.Event()
@@ -66,6 +67,14 @@ def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
     if launcher:
         _die_with(int(launcher))
     return stopping
+
+
+class _OneLine(logging.Formatter):
+    """Writes each message on one line, whatever foreign text is in it; tracebacks follow as they are."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  the base class's name
+        record.message = plain(record.message, _LONGEST_LINE)
+        return super().formatMessage(record)
 
 
 def add_process_arguments(parser: argparse.ArgumentParser) -> None:
@@ -97,7 +106,7 @@ def explain(program: str, error: SwarmTouchError) -> int:
     Returns:
         2 if the configuration is refused (starting again will not help), else 1.
     """
-    print(f"{program}: {error}", file=sys.stderr)
+    print(f"{program}: {plain(error, _LONGEST_LINE)}", file=sys.stderr)
     return EXIT_REFUSED if isinstance(error, ConfigError) else EXIT_FAILED
 
 

@@ -4,11 +4,15 @@ Keys live under the swarm's name (the Zenoh `namespace`), so several swarms shar
 """
 
 import enum
+import functools
+import re
+from typing import Any, NamedTuple
 
 from attrs import frozen
 
 from shared.errors import DecodeError
 from shared.messages import (
+    MAX_DRONE_ID,
     DroneState,
     FormationState,
     HandSample,
@@ -86,13 +90,58 @@ def rank(key: str) -> tuple[int, tuple[tuple[int, str], ...]]:
     )
 
 
-def topic_of(key: str) -> Topic:
-    """Finds the row that a concrete key belongs to.
+class Place(NamedTuple):
+    """What a key says: its topic, and who speaks on it; empty and 0 where the key does not say."""
+
+    topic: Topic
+    role: str = ""
+    id: int = 0
+
+
+@functools.lru_cache(maxsize=4096)
+def parse_key(key: str) -> Place:
+    """Finds the row that a concrete key belongs to, and who speaks on it; keys come from anyone.
 
     Raises:
-        DecodeError: No topic has such a key.
+        DecodeError: No topic has such a key; nothing else is ever raised.
     """
-    for topic in TOPICS:
-        if matches(topic.wildcard, key):
-            return topic
-    raise DecodeError("unknown-key", key)
+    for topic, pattern in _PATTERNS:
+        if found := pattern.fullmatch(key):
+            return Place(topic, **_speaker(found))
+    raise DecodeError("unknown-key", f"{key!r:.80}")
+
+
+def topic_of(key: str) -> Topic:
+    """Returns the row that a concrete key belongs to; errors as for `parse_key`."""
+    return parse_key(key).topic
+
+
+def parse_presence(key: str) -> str:
+    """Returns whose liveliness token has this key, as `role/id`.
+
+    Raises:
+        DecodeError: It is nobody's.
+    """
+    found = _PRESENCE.fullmatch(key)
+    if found is None:
+        raise DecodeError("unknown-key", f"{key!r:.80}")
+    _speaker(found)
+    return f"{found['role']}/{found['id']}"
+
+
+def _speaker(found: re.Match[str]) -> dict[str, Any]:
+    said: dict[str, Any] = found.groupdict()
+    if "id" in said:
+        said["id"] = int(said["id"])
+        if said["id"] > MAX_DRONE_ID:
+            raise DecodeError("unknown-key", f"{found[0]!r:.80}: numbers end at {MAX_DRONE_ID}")
+    return said
+
+
+def _pattern(text: str) -> re.Pattern[str]:
+    """Makes an expression of a key; a role is a short word, a number has one way to be written."""
+    return re.compile(text.format(role="(?P<role>[a-z]{1,16})", id="(?P<id>0|[1-9][0-9]{0,4})"))
+
+
+_PATTERNS = [(topic, _pattern(topic.pattern)) for topic in TOPICS]
+_PRESENCE = _pattern(ALIVE)

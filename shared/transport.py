@@ -16,6 +16,8 @@ Publish = Callable[[bytes], None]
 
 PENDING_PER_KEY = 8
 """How many samples of one key an inbox keeps: the newest counts, a few older ones survive garbage."""
+MOST_KEYS = 4096
+"""How many keys at once: who hears a wildcard hears whatever keys anybody makes up."""
 
 
 class Arrival(NamedTuple):
@@ -30,7 +32,8 @@ class Inbox:
 
     Args:
         clock: Stamps arrivals.
-        depth: Samples kept per key; when full the oldest is dropped and counted in `dropped`.
+        depth: Samples kept per key; when full the oldest is dropped and counted in `dropped`. So is what comes
+            on further keys than `MOST_KEYS`.
 
     Attributes:
         answer: Called on the thread that brings news; wakes the loop unless something else is put there.
@@ -52,7 +55,12 @@ class Inbox:
         """Stores one payload under its key; called by the bus. It is news unless something else is expected."""
         arrival = Arrival(payload, self._clock())
         with self._lock:
-            queue = self._pending.setdefault(key, [])
+            queue = self._pending.get(key)
+            if queue is None:
+                if len(self._pending) >= MOST_KEYS:
+                    self.dropped += 1
+                    return
+                queue = self._pending[key] = []
             if len(queue) >= self._depth:
                 del queue[0]
                 self.dropped += 1

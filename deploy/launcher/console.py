@@ -1,14 +1,31 @@
-"""A console whose reader may vanish (a closed terminal, `| head`) without ending the flight."""
+"""A console that shows foreign text as it is, and whose reader may vanish without ending the flight."""
 
 import os
 import sys
-from typing import TextIO, cast
+from typing import Any, TextIO, cast
 
 from rich.console import Console
+from rich.text import Text
+
+from shared.plain_text import plain
+
+_LONGEST_LINE = 4000
+
+
+class PlainConsole(Console):
+    """A console to which every string is text: not markup, not emoji, and nothing that a terminal acts upon.
+
+    Rich brings each string here that is printed, or stands in a table. Print strings, no `Text` of your own.
+    """
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """See the base class."""
+        lines = "\n".join(plain(line, _LONGEST_LINE) for line in text.split("\n"))
+        return super().render_str(lines, **(options | {"markup": False, "emoji": False, "highlight": False}))
 
 
 class _SteadyStream:
-    """A stream that turns to nowhere when its reader vanishes."""
+    """A stream that turns to nowhere when its reader vanishes (a closed terminal, `| head`)."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -38,4 +55,4 @@ class _SteadyStream:
 def open_console(*, stderr: bool) -> Console:
     """Opens a console on stdout or stderr."""
     stream = _SteadyStream(sys.stderr if stderr else sys.stdout)
-    return Console(file=cast(TextIO, stream), highlight=False)
+    return PlainConsole(file=cast(TextIO, stream), highlight=False)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from attrs import frozen
 from rich.console import Console
-from rich.text import Text
 
 from deploy.launcher.console import open_console
 from deploy.launcher.flight import Flight, Outcome
@@ -112,7 +111,7 @@ def _keep_summary(path: Path, line: str, console: Console) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"{line}\n", encoding="utf-8")
     except OSError as error:
-        console.print(Text(f"launcher | the summary above is not in {path}: {error}"), soft_wrap=True)
+        console.print(f"launcher | the summary above is not in {path}: {error}", soft_wrap=True)
 
 
 def _resolve(options: Options) -> tuple[Scenario, Formation, HandChoice]:

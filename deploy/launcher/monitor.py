@@ -1,23 +1,21 @@
 """What the launcher hears of the flight: decodes, feeds the statistics, remembers who is there."""
 
 from collections import Counter
-from typing import TypeVar
 
 from observer.flight_stats import FlightStats
 from observer.glove_log import GloveLog
 from shared.clock import Clock
-from shared.codec import decode
+from shared.codec import decode_on
 from shared.errors import DecodeError
 from shared.formation import Formation
-from shared.messages import DroneState, HandSample, Message, Mode, PatternEvent, ProcessStatus, Wish
+from shared.messages import DroneState, HandSample, Heard, Message, Mode, PatternEvent, ProcessStatus, Wish
+from shared.order import check_newer
 from shared.topics import DRONE_STATE, HAND, PATTERN, STATUS, topic_of
-from shared.transport import Arrival, Bus, Inbox
+from shared.transport import Bus, Inbox
 
 INBOX_DEPTH = 4096
 """Samples kept per key between two drains: a minute of them, so that the statistics miss none."""
 _ON_THE_GROUND = (Mode.GROUND, Mode.STOP)
-
-M = TypeVar("M", bound=Message)
 
 
 class Monitor:
@@ -36,27 +34,35 @@ class Monitor:
         self.health: dict[str, Health] = {}
         self.rejected: Counter[str] = Counter()
         self._ids = formation.ids
+        self._newest: dict[str, Heard] = {}
         self._inbox = Inbox(clock, INBOX_DEPTH)
         for topic in (HAND, DRONE_STATE, PATTERN, STATUS):
             bus.subscribe(topic.wildcard, self._inbox)
         bus.watch_presence(self._presence_changed)
 
     def drain(self) -> None:
-        """Takes everything that has arrived; call it at 20 Hz or more."""
+        """Takes everything that has arrived, whatever it is; call it at 20 Hz or more."""
         hands: list[HandSample] = []
         states: list[DroneState] = []
         for key, arrivals in self._inbox.take().items():
-            topic = topic_of(key)
-            if topic is HAND:
-                hands += self._decoded(arrivals, HandSample)
-            elif topic is DRONE_STATE:
-                states += (s for s in self._decoded(arrivals, DroneState) if key == DRONE_STATE.key(id=s.id))
-            elif topic is PATTERN:
-                for event in self._decoded(arrivals, PatternEvent):
-                    self.glove.add(event)
-            else:
-                for status in self._decoded(arrivals, ProcessStatus):
-                    self.health.setdefault(f"{status.role}/{status.id}", Health()).add(status)
+            for payload, arrival_ns in arrivals:
+                try:
+                    message = decode_on(key, payload)
+                    self._check_newer(key, message, arrival_ns)
+                except DecodeError as error:
+                    self.rejected[error.reason] += 1
+                    continue
+                match message:
+                    case HandSample():
+                        hands.append(message)
+                    case DroneState():
+                        states.append(message)
+                    case PatternEvent():
+                        self.glove.add(message)
+                    case ProcessStatus():
+                        self.health.setdefault(f"{message.role}/{message.id}", Health()).add(message)
+                    case _:
+                        pass
         self.stats.update(hands, states)
 
     @property
@@ -76,14 +82,13 @@ class Monitor:
         hand = self.stats.hand
         return hand is not None and hand.mode in (Wish.LAND, Wish.STOP) and self.all_down
 
-    def _decoded(self, arrivals: list[Arrival], kind: type[M]) -> list[M]:
-        messages: list[M] = []
-        for arrival in arrivals:
-            try:
-                messages.append(decode(arrival.payload, kind))
-            except DecodeError as error:
-                self.rejected[error.reason] += 1
-        return messages
+    def _check_newer(self, key: str, message: Message, arrival_ns: int) -> None:
+        """Refuses what the swarm refuses, too: else one number out of the future ends all statistics."""
+        if isinstance(message, HandSample | DroneState):
+            sample = Heard(message.epoch, message.seq, arrival_ns)
+            if (last := self._newest.get(key)) is not None:
+                check_newer(sample, last, topic_of(key).stale_s)
+            self._newest[key] = sample
 
     def _presence_changed(self, token: str, present: bool) -> None:
         """Called by the bus, on its thread: single set operations only."""

@@ -10,7 +10,6 @@ from rich import box
 from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
-from rich.text import Text
 
 from deploy.launcher.flight import Flight
 from deploy.launcher.glove_panel import GlovePanel
@@ -149,7 +148,7 @@ class StatusView:
         rows = agent_rows(flight)
         if self._live:
             table = status_table(rows, f"{flight.phase}: {self._run_dir}", _HINT)
-            self._live.update(Group(table, Text(fingers)) if fingers else table, refresh=True)
+            self._live.update(Group(table, fingers) if fingers else table, refresh=True)
             return
         for line in plain_lines(rows):
             self._print(line)
@@ -159,7 +158,7 @@ class StatusView:
         self._print(f"launcher | {text}")
 
     def _print(self, line: str) -> None:
-        self._console.print(Text(line), soft_wrap=True)
+        self._console.print(line, soft_wrap=True)
 
 
 def _agent_row(flight: Flight, drone: int) -> AgentRow:

@@ -5,9 +5,9 @@ import datetime
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from rich.console import Console
 from rich.table import Table
 
+from deploy.launcher.console import open_console
 from deploy.net.authority import WARN_DAYS, create, issue, issued, remove
 from shared.config import load_scenario
 from shared.errors import ConfigError
@@ -60,5 +60,5 @@ def _show(keyring: Keyring) -> int:
         note = f"{each.expires:%Y-%m-%d} ({left} days{', issue it again' if left < WARN_DAYS else ''})"
         yes = ("yes" if each.is_member else "-", "yes" if each.has_key else "no")
         table.add_row(each.name, *yes, ", ".join(each.hosts) or "-", note)
-    Console().print(table)
+    open_console(stderr=False).print(table)
     return worst

@@ -7,6 +7,7 @@ from attrs import frozen
 from shared.messages import DroneState, Flag, ProcessStatus
 from shared.net.audit import LINKED, REFUSED
 from shared.nodes import DRONE, RELAY, WORLD
+from shared.plain_text import plain
 
 WELL_STATES = ("running", "starting")
 WORRYING = (
@@ -61,7 +62,9 @@ class Row:
 
     def _audited(self, prefix: str) -> dict[str, int]:
         metrics = self.heard.status.metrics if self.heard.status else {}
-        return {name.removeprefix(prefix): int(n) for name, n in metrics.items() if name.startswith(prefix)}
+        return {
+            plain(name.removeprefix(prefix)): int(n) for name, n in metrics.items() if name.startswith(prefix)
+        }
 
     @property
     def well(self) -> bool:
@@ -88,7 +91,7 @@ def judge(token: str, heard: Heard) -> Row:
     if heard.status is None:
         problems.append("says nothing")
     elif heard.status.state not in WELL_STATES:
-        problems.append(heard.status.state)
+        problems.append(plain(heard.status.state))
     if token.startswith(f"{DRONE}/") and heard.state is None:
         problems.append("sends no state")
     if heard.state is not None:

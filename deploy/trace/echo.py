@@ -8,10 +8,10 @@ from itertools import islice
 
 from deploy.trace.listen import listen
 from observer.swarm import running_scenario
-from observer.trace.read import decode_on
 from observer.trace.replay import PREFIX
 from observer.trace.schemas import json_fields
 from shared.clock import system_clock
+from shared.codec import decode_on
 from shared.errors import ConfigError, DecodeError
 from shared.process import prepare_process
 from shared.transport import Arrival

@@ -10,16 +10,17 @@ from rich import box
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
-from rich.text import Text
 
 from deploy.launcher.console import open_console
 from deploy.trace.listen import listen
 from observer.link_stats import LinkSummary, SwarmLinks
 from observer.swarm import running_scenario
-from observer.trace.read import Trace, decode_on, open_trace
+from observer.trace.read import Trace, open_trace
 from shared.clock import NS_PER_S, system_clock
+from shared.codec import decode_on
 from shared.errors import DecodeError
 from shared.nodes import OBSERVER
+from shared.plain_text import plain
 from shared.process import prepare_process
 from shared.topics import TOPICS
 
@@ -97,9 +98,9 @@ def complaints(swarm: SwarmLinks) -> list[str]:
 
 
 def print_lines(console: Console, lines: Iterable[str]) -> None:
-    """Prints plain lines, whatever is in them."""
+    """Prints lines as long as they are."""
     for line in lines:
-        console.print(Text(line), soft_wrap=True)
+        console.print(line, soft_wrap=True)
 
 
 def _read(trace: Trace) -> tuple[SwarmLinks, int, int]:
@@ -144,7 +145,7 @@ def _describe(trace: Trace, seconds: float) -> list[str]:
 
 
 def _counts(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"{reason} {count}" for reason, count in sorted(counts.items()) if count)
+    return ", ".join(f"{plain(reason)} {count}" for reason, count in sorted(counts.items()) if count)
 
 
 def _ms(value: float | None) -> str:

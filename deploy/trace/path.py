@@ -112,4 +112,4 @@ def _write(path: Path, text: str, console: Console) -> None:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error}") from error
-    console.print(str(path), markup=False)
+    console.print(str(path))

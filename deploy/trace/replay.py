@@ -30,6 +30,8 @@ def main(*, run: Path, speed: float, keys: Sequence[str], as_live: bool, delay: 
     late = done.lateness_ms
     print(f"{done.messages} messages", end="")
     print(f", late by {late.p50:.2f} ms (median), {late.p99:.2f} ms (p99)" if late.p50 and late.p99 else "")
+    if done.left_out:
+        print(f"{run}: {done.left_out} payloads came on keys that are none of a swarm's and were left out")
     for fault in trace.faults:
         print(f"{run}: {fault}")
     return 0 if done.messages else 1

@@ -5,13 +5,12 @@ No I/O: arrivals and time come in. Nothing that anyone sends raises.
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TypeVar
 
 from observer.console.notices import notices
 from observer.console.protocol import Json
 from observer.console.scene import HandMap
 from shared.clock import NS_PER_S
-from shared.codec import decode
+from shared.codec import decode_on
 from shared.errors import DecodeError
 from shared.formation import Formation
 from shared.messages import (
@@ -20,18 +19,17 @@ from shared.messages import (
     Flag,
     FormationState,
     HandSample,
-    Message,
     Mode,
     PatternEvent,
     ProcessStatus,
     Vector,
 )
 from shared.nodes import WORLD
+from shared.plain_text import plain
 from shared.senses import Sensed, Senses
 from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, STATUS
 from shared.transport import Arrival
 
-M = TypeVar("M", bound=Message)
 Frames = Mapping[str, Sequence[Json]]
 """Pattern name -> frames `{ms, hz: {finger: Hz}}`."""
 
@@ -85,17 +83,26 @@ class SwarmView:
 
     def take(self, arrivals: Mapping[str, Sequence[Arrival]], now_ns: int) -> list[Json]:
         """Takes what has arrived; returns the `pattern` messages that it makes."""
-        known = {key: samples for key, samples in arrivals.items() if key in self._sensed}
-        self._senses.take(known)
+        self._senses.take({key: samples for key, samples in arrivals.items() if key in self._sensed})
         events: list[Json] = []
         for key, samples in arrivals.items():
-            if key == PATTERN.wildcard:
-                events += [self._pattern(event, now_ns) for event in self._decoded(samples, PatternEvent)]
-            elif key == FORMATION_STATE.wildcard:
-                self._formation = ([self._formation, *self._decoded(samples, FormationState)])[-1]
-            elif key not in known:
-                for status in self._decoded(samples, ProcessStatus):
-                    self._statuses[f"{status.message.role}/{status.message.id}"] = status
+            if key in self._sensed:
+                continue
+            for payload, arrival_ns in samples:
+                try:
+                    message = decode_on(key, payload)
+                except DecodeError as error:
+                    self.rejected[error.reason] += 1
+                    continue
+                match message:
+                    case PatternEvent():
+                        events.append(self._pattern(Sensed(message, arrival_ns), now_ns))
+                    case FormationState():
+                        self._formation = Sensed(message, arrival_ns)
+                    case ProcessStatus():
+                        self._statuses[f"{message.role}/{message.id}"] = Sensed(message, arrival_ns)
+                    case _:
+                        pass
         return events
 
     def presence_changed(self, token: str, present: bool) -> None:
@@ -149,8 +156,8 @@ class SwarmView:
         return {
             "type": "pattern",
             "t": self._seconds(now_ns),
-            "name": event.pattern,
-            "outcome": event.outcome,
+            "name": plain(event.pattern),
+            "outcome": plain(event.outcome),
             "cue": event.pattern in self._cues,
             "frames": list(self._patterns.get(event.pattern, ())),
             "elapsed": max(0.0, (now_ns - event.started_ns) / NS_PER_S) if started else 0.0,
@@ -174,24 +181,15 @@ class SwarmView:
         return {
             "name": role if number == "0" else f"{role}-{number}",
             "role": role,
-            "id": int(number) if number.isdecimal() else 0,
+            "id": int(number),
             "present": token in self.present,
-            "state": status.state if status else "starting",
+            "state": plain(status.state) if status else "starting",
             "rate_hz": status.rate_hz if status else 0.0,
             "cpu": status.cpu if status else 0.0,
             "rss_mb": status.rss_mb if status else 0.0,
             "rejected": sum(status.rejected.values()) if status else 0,
             "age": sensed.age(now_ns) if sensed else None,
         }
-
-    def _decoded(self, samples: Sequence[Arrival], kind: type[M]) -> list[Sensed[M]]:
-        messages = []
-        for payload, arrival_ns in samples:
-            try:
-                messages.append(Sensed(decode(payload, kind), arrival_ns))
-            except DecodeError as error:
-                self.rejected[error.reason] += 1
-        return messages
 
     def _seconds(self, now_ns: int) -> float:
         return (now_ns - self._start_ns) / NS_PER_S
@@ -209,7 +207,7 @@ def _drone(sensed: Sensed[DroneState], now_ns: int) -> Json:
         "flags": [flag.name.lower() for flag in Flag if flag in state.flags and flag.name],
         "battery": state.battery,
         "age": sensed.age(now_ns),
-        "links": state.displacements,
+        "links": {plain(name): displacement for name, displacement in state.displacements.items()},
     }
 
 

@@ -20,13 +20,12 @@ from zstandard import ZstdError
 
 from observer.swarm import LATEST, RUNS
 from observer.trace.layout import RECORDER, SCENARIO, has_end, trace_files
-from shared.codec import decode
+from shared.codec import decode_on
 from shared.config import structure_scenario
 from shared.errors import ConfigError, DecodeError
-from shared.messages import DroneState, Message
+from shared.messages import Message
 from shared.scenario import Scenario
 from shared.toml_text import parse_toml
-from shared.topics import DRONE_STATE, topic_of
 
 _LARGEST_RECORD = 1 << 28
 _LONGEST_COUNT = 20
@@ -147,18 +146,6 @@ def open_trace(source: str | Path | None = None) -> Trace:
             f"{path}: no trace; record one with swarmtouch up --record or swarmtouch trace record"
         )
     return Trace(files)
-
-
-def decode_on(key: str, payload: bytes) -> Message:
-    """Decodes what came on a key.
-
-    Raises:
-        DecodeError: Nobody would accept it: an unknown key, no valid message, or another drone's state.
-    """
-    message = decode(payload, topic_of(key).kind)
-    if isinstance(message, DroneState) and key != DRONE_STATE.key(id=message.id):
-        raise DecodeError("wrong-id", f"drone {message.id} on {key}")
-    return message
 
 
 def _top_level(file: Path) -> Iterator[object]:

@@ -8,6 +8,7 @@ import attrs
 from observer.histogram import Histogram, Quantiles
 from observer.trace.read import Record
 from shared.clock import NS_PER_S, Clock
+from shared.errors import DecodeError
 from shared.topics import Delivery, topic_of
 from shared.transport import Bus, Publish
 
@@ -17,9 +18,10 @@ PREFIX = "replay/"
 
 @attrs.frozen
 class Replayed:
-    """What a replay did: messages said, and how much later than their moment, ms."""
+    """What a replay did: messages said, those left out that came on no key of a swarm, lateness, ms."""
 
     messages: int
+    left_out: int
     lateness_ms: Quantiles
 
 
@@ -43,7 +45,7 @@ def replay(
         prefix: What to put before every key.
     """
     publishers: dict[str, Publish] = {}
-    lateness, messages = Histogram(), 0
+    lateness, messages, left_out = Histogram(), 0, 0
     start_ns, first_ns = clock(), 0
     for record in records:
         first_ns = first_ns or record.log_ns
@@ -52,12 +54,16 @@ def replay(
             stopping.wait(early_ns / NS_PER_S)
         if stopping.is_set():
             break
-        publish = publishers.get(record.key) or _publisher(bus, prefix, record.key)
+        try:
+            publish = publishers.get(record.key) or _publisher(bus, prefix, record.key)
+        except DecodeError:
+            left_out += 1
+            continue
         publishers[record.key] = publish
         lateness.add(max(0, clock() - due_ns) / 1e6)
         publish(record.payload)
         messages += 1
-    return Replayed(messages, lateness.quantiles())
+    return Replayed(messages, left_out, lateness.quantiles())
 
 
 def _publisher(bus: Bus, prefix: str, key: str) -> Publish:

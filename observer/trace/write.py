@@ -12,8 +12,8 @@ from typing import IO
 from mcap.writer import Writer
 
 from observer.trace.layout import RECORDER, SCENARIO, trace_file
-from observer.trace.read import decode_on
 from observer.trace.schemas import json_schema
+from shared.codec import decode_on
 from shared.config import dump_scenario
 from shared.errors import ConfigError, DecodeError
 from shared.messages import SCHEMA_VERSION
@@ -25,6 +25,8 @@ MOST_KEYS = 4096
 """Keys in one trace; what a foreign session makes up beyond is refused (MCAP itself ends at 65535)."""
 
 _SEQUENCES = 1 << 32
+_NO_SCHEMA = 0
+"""Of what came on a key of no topic nothing is known, as MCAP says it."""
 
 
 class TraceWriter:
@@ -62,7 +64,7 @@ class TraceWriter:
         self._writer.flush()
 
     def add(self, key: str, arrival: Arrival) -> None:
-        """Writes one payload, whatever it is."""
+        """Writes one payload, whatever it is, and on whatever key."""
         channel = self._channels.get(key) or self._register(key)
         if channel is None:
             self.refused += 1
@@ -97,14 +99,20 @@ class TraceWriter:
     def _register(self, key: str) -> int | None:
         if len(self._channels) >= MOST_KEYS:
             return None
-        kind = topic_of(key).kind
+        channel = self._writer.register_channel(key, "msgpack", self._schema(key))
+        self._channels[key] = channel
+        return channel
+
+    def _schema(self, key: str) -> int:
+        try:
+            kind = topic_of(key).kind
+        except DecodeError:
+            return _NO_SCHEMA
         name = f"swarmtouch.{kind.__name__}"
         if name not in self._schemas:
             schema = json.dumps(json_schema(kind)).encode()
             self._schemas[name] = self._writer.register_schema(name, "jsonschema", schema)
-        channel = self._writer.register_channel(key, "msgpack", self._schemas[name])
-        self._channels[key] = channel
-        return channel
+        return self._schemas[name]
 
 
 def _create(folder: Path) -> tuple[Path, IO[bytes]]:

@@ -319,6 +319,44 @@ def test_swarms_of_other_names_are_not_heard() -> None:
             assert collect(inbox, 1) == {HAND.key(): [b"ours/human/hand"]}
 
 
+def test_what_is_put_on_many_keys_at_once_comes_under_the_key_that_it_was_put_on() -> None:
+    """So that nobody takes it for a sample of its own key: `shared.topics` knows no such key."""
+    with foreigner("ours") as (receiver, session):
+        inbox = inbox_of(receiver, HAND.key(), DRONE_STATE.wildcard)
+        receiver.announce("drone", 1)
+        for key in ("**", "human/*", "drone/1/state"):
+            session.put(f"ours/{key}", key.encode(), congestion_control=zenoh.CongestionControl.BLOCK)
+        found = collect(inbox, 4)
+    assert found == {"**": [b"**", b"**"], "human/*": [b"human/*"], "drone/1/state": [b"drone/1/state"]}
+
+
+@pytest.mark.parametrize("token", ["**", f"drone/{'9' * 5000}", "[/x]/\x1b[31m", "drone/1/2"])
+def test_a_foreign_token_is_nobody_and_is_counted(token: str) -> None:
+    with foreigner("ours") as (receiver, session):
+        presence = Presence(receiver)
+        foreign = session.liveliness().declare_token(f"ours/alive/{token}")
+        relay = session.liveliness().declare_token("ours/alive/relay/0")
+        presence.until("relay/0")
+        assert receiver.audit() == {"refused tokens of no process": 1.0}
+        for declared in (foreign, relay):
+            declared.undeclare()  # type: ignore[no-untyped-call]  # the stub lacks its return type
+        presence.until()
+        assert presence.log == [("relay/0", True), ("relay/0", False)]
+
+
+@contextmanager
+def foreigner(swarm: str) -> Iterator[tuple[ZenohBus, zenoh.Session]]:
+    """Opens a bus, and a session of somebody who puts what he likes where he likes."""
+    (port,) = free_ports(tcp=1, udp=0)[0]
+    tree = {"mode": "client", "connect": {"endpoints": [f"tcp/127.0.0.1:{port}"]}}
+    tree["scouting"] = {"multicast": {"enabled": False}}
+    with (
+        ZenohBus(peer_settings(swarm, f"tcp/127.0.0.1:{port}")) as receiver,
+        zenoh.open(zenoh.Config.from_json5(json.dumps(tree))) as session,
+    ):
+        yield receiver, session
+
+
 def test_an_endpoint_in_use_is_refused_with_a_hint() -> None:
     (port,) = free_ports(tcp=1, udp=0)[0]
     with (

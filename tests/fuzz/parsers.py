@@ -6,14 +6,17 @@ from binascii import crc_hqx
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import partial
+from io import StringIO
 from pathlib import Path
 
 import zenoh
 from attrs import frozen
 from cobs import cobs
+from rich.table import Table
 
 from agents.vehicles import sim
 from agents.vehicles.link import decode_order, decode_pose, encode_order, encode_pose
+from deploy.launcher.console import PlainConsole
 from deploy.net.authority import issued
 from glove_bridge.calibration_file import SHIPPED, load_calibration
 from glove_bridge.framing import StreamDecoder
@@ -38,16 +41,17 @@ from shared.net.audit import Audit
 from shared.net.keyring import Keyring
 from shared.net.settings import node_settings
 from shared.nodes import all_nodes, drone_node
+from shared.plain_text import plain
 from shared.pointer_link import decode_pointed
 from shared.radio_link import decode_datagram, encode_head, radio_group
 from shared.recordings.flight_folder import read_meta, read_obstacles, read_patterns, read_track
 from shared.recordings.ros_bag import read_bag_tracks
 from shared.senses import Senses
 from shared.signature import blank, sign_with, verify_with
-from shared.topics import HAND, TOPICS, rank, topic_of
+from shared.topics import HAND, TOPICS, parse_key, rank
 from shared.transport import Arrival
 from shared.uri import parse_uri
-from tests.fuzz import seeds
+from tests.fuzz import listeners, seeds
 
 CORPUS = Path(__file__).parent / "corpus"
 """Inputs that were findings once, or lead deep into a parser; a folder per row."""
@@ -192,7 +196,27 @@ def _headers(data: bytes) -> object:
 
 def _key(data: bytes) -> object:
     text = data.decode(errors="replace")
-    return rank(text), topic_of(text)
+    rank(text)
+    place = parse_key(text)
+    assert place.topic.key(role=place.role, id=place.id) == text, "a key has one way to be written"
+    return place
+
+
+def _text(data: bytes) -> object:
+    """Foreign text in a terminal, a table and a log."""
+    text = data.decode("utf-8", "surrogateescape")
+    shown = plain(text)
+    assert shown.isprintable(), shown
+    assert not text.isprintable() or text.startswith(shown.removesuffix("..."))
+    out = StringIO()
+    table = Table(title=text, caption=text)
+    table.add_column(text)
+    table.add_row(text)
+    for each in (text, table):
+        PlainConsole(file=out, width=80).print(each)
+    assert out.getvalue().replace("\n", "").isprintable(), out.getvalue()
+    out.getvalue().encode()
+    return shown
 
 
 def _zenoh_log(data: bytes) -> object:
@@ -221,6 +245,13 @@ PARSERS = (
     _Wire(name="radio", parse=_radio, seeds=seeds.radio_datagrams),
     _Wire(name="page", parse=page.parse, seeds=seeds.page_messages),
     _Wire(name="key", parse=_key, seeds=lambda: [b"human/hand", b"drone/12/state", b"status/relay/0"]),
+    _Wire(name="said", parse=listeners.hear, seeds=seeds.said),
+    _Wire(
+        name="token",
+        parse=listeners.hear_token,
+        seeds=lambda: [b"alive/drone/12", b"alive/relay/0", b"alive/observer/65535"],
+    ),
+    _Wire(name="text", parse=_text, seeds=lambda: [b"drone 2", "Müller".encode(), b"[/red] \x1b[31m"]),
     _Wire(name="zenoh-log", parse=_zenoh_log, seeds=lambda: [seeds.ZENOH_LOG]),
     _Wire(name="trace", parse=_in_file("trace.mcap", _trace), seeds=seeds.traces),
     Parser(

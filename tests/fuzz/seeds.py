@@ -17,7 +17,7 @@ from glove_bridge.framing import encode as frame
 from glove_bridge.protocol import PROTOCOL, Ack, Hello, HelloReply, Ping, Play, PlayFrame, Set, Status, Stop
 from shared import pointer_link
 from shared.codec import encode
-from shared.messages import FormationState, PatternEvent, ProcessStatus
+from shared.messages import FormationState, Heard, PatternEvent, ProcessStatus
 from shared.net.keyring import Keyring
 from shared.nodes import drone_node
 from shared.radio_link import encode_head
@@ -75,6 +75,28 @@ def messages() -> list[bytes]:
     event = PatternEvent(**envelope, pattern="EI", outcome="finished", state_seq=5)
     status = ProcessStatus(**envelope, role="drone", id=1, pid=2, host="here", state="running")
     return [encode(message) for message in (hand(1), state(2, 3), formation, event, status)]
+
+
+def said() -> list[bytes]:
+    """Makes every message on its key, a status full of nasty words, and one that speaks for somebody else."""
+    keys = (HAND.key(), "drone/2/state", "formation/state", "glove/pattern", "status/drone/1")
+    nasty = "\x1b]0;mine\x07[/red][bold]\u202e\n"
+    envelope: Any = {"epoch": 7, "seq": 3, "stamp_ns": 9}
+    status = ProcessStatus(
+        **envelope,
+        role="relay",
+        id=0,
+        pid=2,
+        host=nasty,
+        state=nasty,
+        rejected={nasty: 1},
+        metrics={f"refused {nasty}": 1e308, f"linked {nasty}": 1.0},
+    )
+    event = PatternEvent(**envelope, pattern=nasty, outcome="started", state_seq=5)
+    drone = state(2, 3, displacements={nasty: (0.0, 0.0, 0.0)}, heard={nasty: Heard(1, 2, 3)})
+    others = [("status/relay/0", status), ("glove/pattern", event), ("drone/2/state", drone)]
+    spoken = [*zip(keys, messages(), strict=True), *((key, encode(message)) for key, message in others)]
+    return [key.encode() + b"\n" + payload for key, payload in spoken]
 
 
 @cache

@@ -6,6 +6,7 @@ import os
 from typing import cast
 
 import pytest
+from msgspec.structs import replace
 from rich.console import Console
 
 from deploy.launcher.console import open_console
@@ -169,8 +170,45 @@ def test_the_monitor_counts_garbage_and_impostors_and_goes_on() -> None:
     swarm.bus.publisher(HAND)(b"\xff\x00")
     swarm.bus.publisher(DRONE_STATE, id=3)(encode(state(2)))
     swarm.say(state(1))
-    assert swarm.monitor.rejected == {"malformed": 1}
+    assert swarm.monitor.rejected == {"malformed": 1, "wrong-id": 1}
     assert set(swarm.monitor.stats.latest) == {1}
+
+
+def test_whatever_key_is_put_the_monitor_goes_on() -> None:
+    swarm = Swarm()
+    keys = (
+        "**",
+        "human/*",
+        "drone/x/state",
+        f"drone/{'9' * 5000}/state",
+        "status/[/x]/\x1b[31m",
+        "",
+        "a" * 9000,
+    )
+    for key in keys:
+        swarm.monitor._inbox.put(key, b"\xc0")
+    assert swarm.say(state(1)).stats.latest.keys() == {1}
+    assert swarm.monitor.rejected == {"unknown-key": len(keys)}
+
+
+def test_nobody_speaks_for_another() -> None:
+    swarm = Swarm()
+    swarm.bus.publisher(STATUS, role="drone", id=2)(encode(status(1)))
+    swarm.bus.publisher(STATUS, role="relay", id=1)(encode(status(1)))
+    swarm.bus.publisher(DRONE_STATE, id=2)(encode(state(1)))
+    assert swarm.say(status(1)).health.keys() == {"drone/1"}
+    assert swarm.monitor.rejected == {"wrong-id": 3}
+
+
+def test_one_number_out_of_the_future_does_not_end_the_statistics() -> None:
+    swarm = Swarm()
+    last = 2**63
+    monitor = swarm.say(hand(), replace(hand(Wish.STOP), seq=last), state(1), state(1, Mode.STOP, seq=last))
+    monitor = swarm.say(state(1, Mode.FOLLOW, seq=1))
+    assert monitor.stats.latest[1].mode is Mode.FOLLOW
+    assert monitor.stats.hand == hand()
+    assert monitor.stats.agents()[0].steps == 2
+    assert monitor.rejected == {"ahead": 2}
 
 
 def test_presence_is_followed() -> None:

@@ -300,6 +300,15 @@ def test_a_hand_log_finds_samples_by_what_was_sent() -> None:
     assert log.sent_by(T0 + 2 * TICK) == 1
 
 
+def test_a_hand_log_goes_on_behind_a_number_out_of_the_future() -> None:
+    log = HandLog()
+    for seq in (2**64 - 1, 3, 4, 4, 2):
+        log.add(hand(seq))
+    assert log.stamp_ns(2**64) == T0 + 3 * TICK
+    assert log.number(Heard(1, 4, 0)) == 2**64 + 1
+    assert log.stamp_ns(2**64 + 1) == T0 + 4 * TICK
+
+
 @given(st.lists(st.floats(1e-2, 1e4), min_size=1, max_size=200), st.floats(0.01, 1.0))
 def test_quantiles_are_within_a_bin_of_the_exact_ones(values: list[float], fraction: float) -> None:
     histogram = Histogram()

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.transport import PENDING_PER_KEY, Arrival, Inbox
+from shared.transport import MOST_KEYS, PENDING_PER_KEY, Arrival, Inbox
 
 DEADLINE_S = 10.0
 
@@ -36,6 +36,16 @@ def test_a_full_key_drops_its_oldest_and_counts_them() -> None:
     assert [arrival.payload[0] for arrival in taken["a"]] == list(range(3, PENDING_PER_KEY + 3))
     assert taken["b"] == [Arrival(b"x", 0)]
     assert inbox.dropped == 3
+
+
+def test_made_up_keys_do_not_fill_the_memory() -> None:
+    inbox = Inbox(lambda: 0)
+    for number in range(MOST_KEYS + 10):
+        inbox.put(f"status/x/{number}", b"")
+    assert len(inbox.take()) == MOST_KEYS
+    assert inbox.dropped == 10
+    inbox.put("a", b"x")
+    assert inbox.take() == {"a": [Arrival(b"x", 0)]}
 
 
 @given(depth=st.integers(1, 5), keys=st.lists(st.sampled_from("abc"), max_size=30))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from observer.link_stats import LinkStats, LinkSummary, SwarmLinks
+from observer.link_stats import OTHER_KEYS, LinkStats, LinkSummary, SwarmLinks
 from shared.messages import Heard
 from shared.nodes import OBSERVER
 from shared.topics import DRONE_STATE, HAND
@@ -50,7 +50,7 @@ def test_what_comes_late_is_not_lost_and_what_comes_twice_is_late_only() -> None
     assert (row.missing, row.late) == (0, 4)
 
 
-@given(st.sets(st.integers(0, 300), min_size=1), st.randoms(use_true_random=False))
+@given(st.sets(st.integers(0, 250), min_size=1), st.randoms(use_true_random=False))
 def test_loss_is_what_lies_between_the_first_and_the_newest_and_never_came(
     seqs: set[int], random: Random
 ) -> None:
@@ -63,9 +63,43 @@ def test_loss_is_what_lies_between_the_first_and_the_newest_and_never_came(
     assert row.messages == len(seqs)
 
 
-def test_a_forged_jump_costs_no_memory() -> None:
-    row = link([(1, 0), (1, 2**63)])
-    assert row.missing == 2**63 - 1
+def test_a_number_out_of_the_future_is_refused_and_changes_nothing() -> None:
+    swarm = SwarmLinks()
+    for number, seq in enumerate((0, 1, 2**64 - 1, 2, 3)):
+        swarm.add(HAND.key(), hand(seq), number * PERIOD)
+    (row,) = swarm.rows()
+    assert (row.messages, row.missing, row.late) == (4, 0, 0)
+    assert swarm.rejected[HAND.key()] == {"ahead": 1}
+
+
+def test_a_link_whose_first_number_was_out_of_the_future_is_counted_on_after_a_silence() -> None:
+    swarm = SwarmLinks()
+    for seq, at in ((2**64 - 1, 0), (10, PERIOD), (11, 200 * PERIOD), (12, 201 * PERIOD)):
+        swarm.add(HAND.key(), hand(seq), at)
+    (row,) = swarm.rows()
+    assert (row.messages, row.missing, row.late) == (4, 0, 1)
+
+
+def test_keys_that_are_made_up_have_one_row() -> None:
+    swarm = SwarmLinks()
+    for number in range(1000):
+        swarm.reject(f"drone/x{number}/state", "unknown-key")
+        heard = {f"made/up/{number}": Heard(1, 1, 1), HAND.key(): Heard(1, number, number * PERIOD)}
+        swarm.add(DRONE_STATE.key(id=2), state(2, number, heard=heard), number * PERIOD)
+    assert [(row.key, row.listener) for row in swarm.rows()] == [
+        (DRONE_STATE.key(id=2), OBSERVER),
+        (OTHER_KEYS, OBSERVER),
+        (HAND.key(), "drone/2"),
+    ]
+    assert swarm.rejected[OTHER_KEYS] == {"unknown-key": 1000}
+
+
+def test_a_long_gap_costs_no_memory() -> None:
+    stats = LinkStats()
+    for seq in (0, 10**9):
+        stats.add(Heard(1, seq, seq * PERIOD), seq * PERIOD)
+    assert stats.summary("human/hand", OBSERVER).missing == 10**9 - 1
+    assert len(stats._missing) <= 1024
 
 
 def test_jitter_is_the_deviation_of_the_arrivals() -> None:

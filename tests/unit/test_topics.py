@@ -19,6 +19,8 @@ from shared.topics import (
     TOPICS,
     Delivery,
     Topic,
+    parse_key,
+    parse_presence,
     topic_of,
 )
 
@@ -29,6 +31,14 @@ KEYS = [
     (PATTERN, PATTERN.key(), "glove/pattern"),
     (STATUS, STATUS.key(role="drone", id=2), "status/drone/2"),
 ]
+
+
+FOREIGN = (
+    *("", "human", "human/hand/2", "human/foot", "drone/2", "alive/drone/2", "**", "human/*", "drone/*/state"),
+    *("drone/x/state", "drone/02/state", "drone/-1/state", "drone/65536/state", f"drone/{'9' * 5000}/state"),
+    *("drone/2/state\n", "drone/²/state", "status/[red]/0", "status/Drone/1", "status/drone/1/2"),
+    *("status/drone/", f"status/{'a' * 17}/0", "status/\x1b[31m/0", "replay/human/hand", "\udce9"),
+)
 
 
 @pytest.mark.parametrize(("topic", "key", "text"), KEYS)
@@ -54,18 +64,39 @@ def test_each_key_belongs_to_one_topic_only(number: int) -> None:
         assert [other for other in TOPICS if _matches(other.wildcard, key)] == [topic]
 
 
-@given(key=st.text(alphabet="drone/1stahumk{}*", max_size=20))
-def test_a_key_has_its_topic_or_is_refused(key: str) -> None:
-    owners = [topic for topic in TOPICS if _matches(topic.wildcard, key)]
-    if owners:
-        assert [topic_of(key)] == owners
-    else:
-        with pytest.raises(DecodeError) as refused:
-            topic_of(key)
-        assert refused.value.reason == "unknown-key"
+@given(key=st.text(alphabet="drone/1stahumk{}*", max_size=20) | st.text())
+def test_a_key_says_who_speaks_on_what_or_is_refused(key: str) -> None:
+    try:
+        place = parse_key(key)
+    except DecodeError:
+        return
+    assert place.topic.key(role=place.role, id=place.id) == key
+    assert [topic for topic in TOPICS if _matches(topic.wildcard, key)] == [place.topic]
 
 
-@pytest.mark.parametrize("key", ["", "human", "human/hand/2", "human/foot", "drone/2", "alive/drone/2"])
+@given(role=st.sampled_from(["drone", "relay", "observer"]), number=st.integers(0, 65_535))
+def test_every_process_has_a_token_and_a_status(role: str, number: int) -> None:
+    assert parse_presence(ALIVE.format(role=role, id=number)) == f"{role}/{number}"
+    assert parse_key(STATUS.key(role=role, id=number)) == (STATUS, role, number)
+
+
+@pytest.mark.parametrize(
+    "token",
+    [
+        *(key for key in FOREIGN if key != "alive/drone/2"),
+        "alive/drone",
+        "alive/**",
+        "alive/drone/01",
+        f"alive/drone/{'9' * 5000}",
+        "alive/[b]/1",
+    ],
+)
+def test_foreign_tokens_are_nobodys(token: str) -> None:
+    with pytest.raises(DecodeError, match="unknown-key"):
+        parse_presence(token)
+
+
+@pytest.mark.parametrize("key", FOREIGN)
 def test_other_keys_are_refused_by_name(key: str) -> None:
     with pytest.raises(DecodeError, match="unknown-key"):
         topic_of(key)

@@ -33,6 +33,7 @@ GARBAGE = [
     (HAND.key(), msgpack.packb({"v": 1, "seq": "x"})),
     (DRONE_STATE.key(id=2), encode(state(1, 5))),
     ("drone/x/state", encode(state(1, 5))),
+    ("**", encode(hand(5))),
 ]
 
 
@@ -44,7 +45,7 @@ def test_what_is_written_comes_back_byte_by_byte_and_in_order(tmp_path: Path) ->
     assert pairs(records) == sent
     assert [r.log_ns for r in records] == [START_NS + n * STEP_NS for n in range(len(sent))]
     assert (records[3].seq, records[3].publish_ns) == (1, START_NS + 10)
-    assert [(r.seq, r.publish_ns - r.log_ns) for r in records[-5:]] == [(0, 0)] * 5
+    assert [(r.seq, r.publish_ns - r.log_ns) for r in records[-6:]] == [(0, 0)] * 6
     assert (trace.scenario, trace.truncated, trace.faults) == (SCENARIO, False, [])
     assert {"swarmtouch", "eclipse-zenoh", "mcap"} < trace.metadata["versions"].keys()
     assert trace.metadata["host"]["name"]
