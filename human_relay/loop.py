@@ -1,12 +1,13 @@
 """The relay's loop: receive from the source and the operator, compute, publish; nothing comes back."""
 
+import logging
 import threading
 from collections.abc import Callable
 
 from msgspec.structs import replace
 
-from human_relay.relay import RelayState, has_news, make_sample, order, repeat_ns
-from human_relay.sources.base import HandSource
+from human_relay.relay import IMPOSSIBLE_POSE, RelayState, has_news, make_sample, order, repeat_ns
+from human_relay.sources.base import HandPose, HandSource
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
 from shared.messages import Wish
@@ -15,6 +16,9 @@ from shared.process import StatusReporter
 from shared.signature import Sign, blank
 from shared.topics import HAND
 from shared.transport import Bus
+
+_LOG_PERIOD_NS = 5 * NS_PER_S
+_log = logging.getLogger("hand")
 
 WaitForOrders = Callable[[float], list[Wish]]
 """Waits for at most so many seconds; returns the operator's orders so far, at once when there are any."""
@@ -42,10 +46,11 @@ def run(
     status = StatusReporter(bus, RELAY, 0, clock)
     state = RelayState(epoch=clock())
     ordered: list[Wish] = []
+    rejected, complain_ns = 0, 0
 
     def report(word: str, *, force: bool = False) -> None:
         metrics = {"samples": float(state.seq)}
-        status.tick(state.seq, word, {"impossible-pose": state.rejected}, lambda: metrics, force=force)
+        status.tick(state.seq, word, {IMPOSSIBLE_POSE: state.rejected}, lambda: metrics, force=force)
 
     while not stopping.is_set():
         now = clock()
@@ -54,8 +59,17 @@ def run(
         offered = source.poll(now)
         if ordered or has_news(state, offered) or now >= repeat_ns(state):
             state, sample = make_sample(state, offered, now, finished=source.finished)
+            if offered and state.rejected > rejected and now >= complain_ns:
+                _complain(offered, state.rejected)
+                complain_ns = now + _LOG_PERIOD_NS
+            rejected = state.rejected
             publish(sign(encode(replace(sample, signature=blank()))) if sign else encode(sample))
         report("running")
         wake_ns = min(source.next_ns(now), repeat_ns(state))
         ordered = wait((wake_ns - clock()) / NS_PER_S)
     report("ending", force=True)
+
+
+def _complain(offered: HandPose, count: int) -> None:
+    place = ", ".join(f"{x:g}" for x in offered.position)
+    _log.warning("no hand can be at (%s) m and have come there; in metres? (so far %d)", place, count)

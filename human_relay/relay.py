@@ -24,6 +24,9 @@ STALE_NS = NS_PER_S // 10
 MAX_YAW = 1_000.0
 """Largest yaw that receivers accept, rad."""
 
+IMPOSSIBLE_POSE = "impossible-pose"
+"""By this reason the relay's status counts the poses of its source that it has refused."""
+
 _STRENGTH = {Wish.FLY: 0, Wish.GROUND: 0, Wish.HOLD: 1, Wish.LAND: 2, Wish.STOP: 3}
 
 

@@ -10,7 +10,8 @@ scenario, lands, ends every process and prints a summary. Each run leaves runs/<
 scenario, one log per process and summary.json; runs/latest points at the newest.
 
 While it flies: Ctrl-C lands and ends within 6 s, again: within 1 s; the space bar stops all motors.
-Exit code 0: everybody landed, no process ended unexpectedly, no collision, no fence exit."""
+Exit code 0: every drone followed if the hand asked for it, everybody landed, no process ended unexpectedly,
+no collision, no fence exit; else 1, and the summary says why."""
 EXAMPLE = """swarmtouch up rhombus --seconds 30
          swarmtouch up slalom --console --hand pointer://
          swarmtouch up maze --hand recording:flights/S2_visual_1

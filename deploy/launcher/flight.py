@@ -16,7 +16,7 @@ from deploy.launcher.monitor import Monitor
 from deploy.launcher.process_table import ProcessRow
 from deploy.launcher.supervisor import Child, Supervisor
 from shared.formation import Formation
-from shared.nodes import RELAY
+from shared.nodes import RELAY, WORLD
 
 LANDING_S = 6.0
 """A landing at the end of the flight may take so long,"""
@@ -46,16 +46,20 @@ class Outcome:
         seconds: From the start of the relay to the end of the landing.
         unexpected_exits: Exit codes by process name.
         restarts: How many processes were started again.
+        failed_starts: How often the system could not start a process, by name.
         landed: Whether every drone was on the ground at the end, without an emergency stop.
         refused: Processes that refused their configuration.
-        referee: What the simulated world's referee saw, empty without one.
+        simulated: Whether there was a simulated world with a referee.
+        referee: What the referee saw; empty if that is unknown.
     """
 
     seconds: float
     unexpected_exits: dict[str, list[int]]
     restarts: dict[str, int]
+    failed_starts: dict[str, int]
     landed: bool
     refused: tuple[str, ...]
+    simulated: bool
     referee: dict[str, float]
 
 
@@ -160,13 +164,24 @@ class Flight:
             seconds=seconds,
             unexpected_exits={child.row.name: child.exits for child in children if child.exits},
             restarts={child.row.token: child.restarts for child in children},
+            failed_starts={child.row.name: child.failed_starts for child in children if child.failed_starts},
             landed=landed,
             refused=self._refused(),
-            referee=_read_referee(self.run_dir / "referee.json"),
+            simulated=any(row.role == WORLD for row in self._rows),
+            referee=self._read_referee(),
         )
 
     def _refused(self) -> tuple[str, ...]:
         return tuple(child.row.name for child in self.supervisor.children.values() if child.refused)
+
+    def _read_referee(self) -> dict[str, float]:
+        """Returns the referee's last report; where the disk has kept none, what the world last said."""
+        try:
+            report: dict[str, float] = json.loads((self.run_dir / "referee.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            health = self.monitor.health.get(f"{WORLD}/0")
+            return health.status.metrics if health and health.status else {}
+        return report
 
     def _interrupt(self) -> None:
         self._interrupts += 1
@@ -179,16 +194,9 @@ class Flight:
     def _unexpected_exit(self, child: Child, code: int, delay_s: float | None) -> None:
         then = "it stays down" if delay_s is None else f"it starts again in {delay_s:.2f} s"
         log = self.run_dir / "logs" / f"{child.row.name}.log"
-        self._view.event(f"{child.row.name} ended unexpectedly ({_exit_word(code)}); {then}; see {log}")
+        self._view.event(f"{child.row.name} ended unexpectedly ({exit_word(code)}); {then}; see {log}")
 
 
-def _exit_word(code: int) -> str:
+def exit_word(code: int) -> str:
+    """Names an exit code, or the signal that it stands for."""
     return signal.Signals(-code).name if code < 0 else f"exit code {code}"
-
-
-def _read_referee(path: Path) -> dict[str, float]:
-    try:
-        report: dict[str, float] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return report

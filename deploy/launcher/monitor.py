@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+from human_relay.relay import IMPOSSIBLE_POSE
 from observer.flight_stats import FlightStats
 from observer.glove_log import GloveLog
 from shared.clock import Clock
@@ -9,6 +10,7 @@ from shared.codec import decode_on
 from shared.errors import DecodeError
 from shared.formation import Formation
 from shared.messages import DroneState, HandSample, Heard, Message, Mode, PatternEvent, ProcessStatus, Wish
+from shared.nodes import RELAY
 from shared.order import check_newer
 from shared.topics import DRONE_STATE, HAND, PATTERN, STATUS, topic_of
 from shared.transport import Bus, Inbox
@@ -25,6 +27,9 @@ class Monitor:
         bus: The observer's connection to the swarm.
         formation: The formation that flies.
         clock: The launcher's clock.
+
+    Attributes:
+        asked: Whether the hand has ever wished that the drones fly.
     """
 
     def __init__(self, bus: Bus, formation: Formation, clock: Clock) -> None:
@@ -33,6 +38,7 @@ class Monitor:
         self.present: set[str] = set()
         self.health: dict[str, Health] = {}
         self.rejected: Counter[str] = Counter()
+        self.asked = False
         self._ids = formation.ids
         self._newest: dict[str, Heard] = {}
         self._inbox = Inbox(clock, INBOX_DEPTH)
@@ -63,7 +69,14 @@ class Monitor:
                         self.health.setdefault(f"{message.role}/{message.id}", Health()).add(message)
                     case _:
                         pass
+        self.asked |= any(hand.mode is Wish.FLY for hand in hands)
         self.stats.update(hands, states)
+
+    @property
+    def rejected_poses(self) -> int:
+        """How many poses of the hand the relay has refused as impossible."""
+        health = self.health.get(f"{RELAY}/0")
+        return health.rejected[IMPOSSIBLE_POSE] if health else 0
 
     @property
     def all_down(self) -> bool:
@@ -99,7 +112,7 @@ class Monitor:
 
 
 class Health:
-    """The newest status of one process, its mean CPU and largest memory over the flight.
+    """The newest status of one process, and what it comes to over the flight.
 
     Attributes:
         status: The newest status, None before the first.
@@ -110,14 +123,22 @@ class Health:
         self.status: ProcessStatus | None = None
         self.rss_mb = 0.0
         self._cpu_sum, self._cpu_count = 0.0, 0
+        self._rejected_before: Counter[str] = Counter()
 
     def add(self, status: ProcessStatus) -> None:
         """Takes the next status."""
+        if self.status and self.status.epoch != status.epoch:
+            self._rejected_before.update(self.status.rejected)
         self.status = status
         self.rss_mb = max(self.rss_mb, status.rss_mb)
         if status.seq > 0:  # the first of an epoch covers the start-up
             self._cpu_sum += status.cpu
             self._cpu_count += 1
+
+    @property
+    def rejected(self) -> Counter[str]:
+        """What it has dropped, by reason, over all of its restarts."""
+        return self._rejected_before + Counter(self.status.rejected if self.status else {})
 
     @property
     def cpu(self) -> float:

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from deploy.launcher.flight import Flight
 from deploy.launcher.glove_panel import GlovePanel
+from deploy.launcher.monitor import Monitor
 from shared.messages import DroneState, Flag, ProcessStatus
 from shared.nodes import DRONE
 
@@ -145,12 +146,14 @@ class StatusView:
         if now < self._due and (not self._live or fingers == self._fingers):
             return
         self._due, self._fingers = now + self._period, fingers
-        rows = agent_rows(flight)
+        rows, hand = agent_rows(flight), _hand_words(flight.monitor)
         if self._live:
-            table = status_table(rows, f"{flight.phase}: {self._run_dir}", _HINT)
+            table = status_table(
+                rows, f"{flight.phase}: {self._run_dir}", "\n".join(filter(None, (hand, _HINT)))
+            )
             self._live.update(Group(table, fingers) if fingers else table, refresh=True)
             return
-        for line in plain_lines(rows):
+        for line in (*plain_lines(rows), *([f"hand | {hand}"] if hand else [])):
             self._print(line)
 
     def event(self, text: str) -> None:
@@ -159,6 +162,11 @@ class StatusView:
 
     def _print(self, line: str) -> None:
         self._console.print(line, soft_wrap=True)
+
+
+def _hand_words(monitor: Monitor) -> str:
+    rejected = monitor.rejected_poses
+    return f"{rejected} poses of the hand are impossible: see relay.log" if rejected else ""
 
 
 def _agent_row(flight: Flight, drone: int) -> AgentRow:

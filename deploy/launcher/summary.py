@@ -7,10 +7,12 @@ import attrs
 from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from deploy.launcher.flight import Outcome
-from deploy.launcher.monitor import Monitor
+from deploy.launcher.flight import Outcome, exit_word
+from deploy.launcher.monitor import Health, Monitor
 from deploy.launcher.process_table import GloveChoice
+from deploy.verdict import absences, contacts
 from observer.agent_log import AgentSummary
 from observer.glove_log import GloveLog
 from shared.nodes import DRONE
@@ -29,18 +31,24 @@ def flight_summary(outcome: Outcome, monitor: Monitor, glove: GloveChoice | None
         glove: What the operator wore.
 
     Returns:
-        The JSON contract: `ok` (no unexpected exit, all landed, and by the referee no collision and no fence
-        exit), `seconds`, `restarts`, the referee's `min_distance_m`, `min_hand_distance_m`, `collisions`,
-        `fence_exits` (null without a simulated world), `agents` with `id, steps, rate_hz, on_time, hand_used,
-        tracking_rms_m, latency_ms {p50, p99}, cpu, rss_mb` each; and beyond the contract `landed`,
-        `formation`, `glove` (null without one: `uri`, `patterns`; `played`, `delivered`, `suppressed`, `failed`
-        and `lost` by pattern; `latency_ms` from the drone state to the first frame) and, per agent,
-        `lateness_ms`, `missed` and `restarts`.
+        The JSON contract: `ok` (no `faults`: no unexpected exit, every drone followed if the hand ever asked
+        for it, all landed, and by the referee no collision and no fence exit), `seconds`, `restarts`, its
+        `min_distance_m`, `min_hand_distance_m`, `collisions`, `fence_exits` (null without a simulated world),
+        `agents` with `id, steps, rate_hz, on_time, hand_used, tracking_rms_m, latency_ms {p50, p99}, cpu,
+        rss_mb` each; and beyond the contract `faults` (sentences), `hand` (`asked`: whether it ever asked to
+        fly; `rejected`: how many of its poses were impossible), `landed`, `formation`, `glove` (null without
+        one: `uri`, `patterns`; `played`, `delivered`, `suppressed`, `failed` and `lost` by pattern;
+        `latency_ms` from the drone state to the first frame) and, per agent, `followed`, `lateness_ms`,
+        `missed`, `rejected` (by reason) and `restarts`.
     """
     referee = outcome.referee
     formation = attrs.asdict(monitor.stats.formation())
+    agents = [_agent(agent, outcome, monitor) for agent in monitor.stats.agents()]
+    hand = {"asked": monitor.asked, "rejected": monitor.rejected_poses}
+    faults = _faults(outcome, {agent["id"]: agent["followed"] for agent in agents}, hand)
     return {
-        "ok": _went_well(outcome),
+        "ok": not faults,
+        "faults": faults,
         "seconds": outcome.seconds,
         "restarts": sum(outcome.restarts.values()),
         "landed": outcome.landed,
@@ -48,7 +56,8 @@ def flight_summary(outcome: Outcome, monitor: Monitor, glove: GloveChoice | None
         "min_hand_distance_m": referee.get("min_hand_distance_m"),
         "collisions": _count(referee, "collisions"),
         "fence_exits": _count(referee, "fence_exits"),
-        "agents": [_agent(agent, outcome, monitor) for agent in monitor.stats.agents()],
+        "hand": hand,
+        "agents": agents,
         "formation": formation,
         "glove": _glove(glove, monitor.glove) if glove else None,
     }
@@ -61,12 +70,25 @@ def print_summary(summary: Json, console: Console) -> None:
         console.print(_formation_table(summary["formation"]))
     if summary["glove"]:
         console.print(_glove_table(summary["glove"]))
-    console.print(_referee_table(summary))
+    console.print(_flight_table(summary))
+    for fault in summary["faults"]:
+        console.print(Text(f"not ok: {fault}"), soft_wrap=True)
 
 
-def _went_well(outcome: Outcome) -> bool:
-    contacts = sum(outcome.referee.get(name, 0) for name in ("collisions", "fence_exits"))
-    return outcome.landed and not outcome.unexpected_exits and contacts == 0
+def _faults(outcome: Outcome, followed: Mapping[int, bool], hand: Json) -> list[str]:
+    exits, failures = outcome.unexpected_exits, outcome.failed_starts
+    return [
+        *(f"{name} ended unexpectedly ({', '.join(map(exit_word, codes))})" for name, codes in exits.items()),
+        *(f"{name} could not be started ({count} times)" for name, count in failures.items()),
+        *absences(followed, asked=hand["asked"], rejected=hand["rejected"]),
+        *contacts(outcome.referee),
+        *(["what the referee saw is unknown"] if outcome.simulated and not outcome.referee else []),
+        *([] if outcome.landed else ["not every drone was seen to land"]),
+    ]
+
+
+def _health(monitor: Monitor, token: str) -> Health:
+    return monitor.health.get(token) or Health()
 
 
 def _count(referee: Mapping[str, float], name: str) -> int | None:
@@ -75,9 +97,10 @@ def _count(referee: Mapping[str, float], name: str) -> int | None:
 
 def _agent(agent: AgentSummary, outcome: Outcome, monitor: Monitor) -> Json:
     token = f"{DRONE}/{agent.id}"
-    health = monitor.health.get(token)
+    health = _health(monitor, token)
     return {
         "id": agent.id,
+        "followed": agent.tracking_rms_m is not None,
         "steps": agent.steps,
         "missed": agent.missed,
         "rate_hz": agent.rate_hz,
@@ -87,8 +110,9 @@ def _agent(agent: AgentSummary, outcome: Outcome, monitor: Monitor) -> Json:
         "tracking_rms_m": agent.tracking_rms_m,
         "latency_ms": agent.latency_ms._asdict(),
         "restarts": outcome.restarts.get(token, 0),
-        "cpu": health.cpu if health else 0.0,
-        "rss_mb": health.rss_mb if health else 0.0,
+        "rejected": dict(health.rejected),
+        "cpu": health.cpu,
+        "rss_mb": health.rss_mb,
     }
 
 
@@ -138,8 +162,10 @@ def _glove_table(glove: Json) -> Table:
     return table
 
 
-def _referee_table(summary: Json) -> Table:
-    table = _table("referee", "", "")
+def _flight_table(summary: Json) -> Table:
+    table = _table("flight", "", "")
+    table.add_row("the hand asked to fly", "yes" if summary["hand"]["asked"] else "no")
+    table.add_row("its poses that were impossible", str(summary["hand"]["rejected"]))
     table.add_row("smallest distance between drones, m", _number(summary["min_distance_m"]))
     table.add_row("smallest distance to the hand, m", _number(summary["min_hand_distance_m"]))
     table.add_row("collisions", _number(summary["collisions"], 0))

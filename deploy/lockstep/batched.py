@@ -233,4 +233,5 @@ def fly_batched(scenario: Scenario, formation: Formation, samples: Sequence[Hand
     hand = track_hand(samples, hand_settings(scenario, formation))
     batch = Batch(scenario, formation, rest_places(formation, hand)[None])
     moments = [batch.advance(hands_at([hand], tick)) for tick in range(len(samples))]
-    return make_record(formation, hand, [Moment(*(array[0] for array in moment)) for moment in moments])
+    first = [Moment(*(array[0] for array in moment)) for moment in moments]
+    return make_record(formation, hand, first, formation.ids)

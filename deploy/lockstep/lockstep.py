@@ -44,12 +44,14 @@ class Lockstep:
     Attributes:
         flyers: The bodies now, in the formation's order.
         tick: Number of the next tick.
+        followed: The drones that have been in FOLLOW.
         payloads: If encoded: what was published in the last tick, by key: the hand's sample and every state.
     """
 
     def __init__(self, scenario: Scenario, formation: Formation, fleet: Fleet, *, encoded: bool = True) -> None:
         self.flyers = flyers(fleet)
         self.tick = 0
+        self.followed: set[int] = set()
         self.payloads: dict[str, bytes] = {}
         self._encoded = encoded
         self._rate = scenario.rates.control_hz
@@ -80,6 +82,7 @@ class Lockstep:
             states[row] = self._agents[row].step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
             self._publish(self._keys[row], states[row], now)
         ordered = [states[row] for row in range(len(states))]
+        self.followed.update(state.id for state in ordered if state.mode is Mode.FOLLOW)
         duration = tick_length(self.tick, self._rate)
         self.flyers = [
             advance_flyer(self.flyers[row], _COMMANDS[state.mode], state.setpoint, duration)
@@ -133,7 +136,7 @@ def fly_lockstep(
     fleet = start_fleet(scenario, formation, start, airborne=airborne, held=rows)
     swarm = Lockstep(scenario, formation, fleet, encoded=encoded)
     moments = [_moment(formation, swarm.advance(sample)) for sample in samples]
-    return make_record(formation, hand, moments)
+    return make_record(formation, hand, moments, swarm.followed)
 
 
 def _moment(formation: Formation, states: list[DroneState]) -> Moment:

@@ -1,7 +1,7 @@
 """What a simulated run leaves: arrays over ticks, the referee's verdict and a CSV file."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,6 +41,7 @@ class Record:
         goal: (T, N, 3) m.
         setpoint: (T, N, 3) m.
         displacement: (T, L, 3) m.
+        followed: The drones that were ever in FOLLOW.
     """
 
     formation: Formation
@@ -49,13 +50,17 @@ class Record:
     goal: Vec = field(eq=False)
     setpoint: Vec = field(eq=False)
     displacement: Vec = field(eq=False)
+    followed: frozenset[int]
 
 
-def make_record(formation: Formation, hand: HandTrack, moments: Sequence[Moment]) -> Record:
+def make_record(
+    formation: Formation, hand: HandTrack, moments: Sequence[Moment], followed: Iterable[int]
+) -> Record:
     """Stacks the ticks of a run, in order."""
     return Record(
         formation=formation,
         hand=hand,
+        followed=frozenset(followed),
         position=np.array([moment.position for moment in moments]),
         goal=np.array([moment.goal for moment in moments]),
         setpoint=np.array([moment.setpoint for moment in moments]),

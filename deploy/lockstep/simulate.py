@@ -1,6 +1,7 @@
 """From what the user asked for to a simulated run and its summary."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,11 @@ from deploy.lockstep.hand_track import relayed
 from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.picture import draw
 from deploy.lockstep.record import Record, judge, tracking_rms, write_csv
-from human_relay.sources import source_hints
+from deploy.verdict import absences, contacts
+from human_relay.sources import plays_by_itself, source_hints
 from shared.compiled import form
+from shared.errors import ConfigError
+from shared.messages import HandSample, Wish
 from shared.scenario import Scenario
 from shared.scenario_check.check import open_scenario
 
@@ -49,12 +53,15 @@ def simulate(options: Options) -> dict[str, Any]:
     """Simulates one flight from a hover in the rest formation.
 
     Returns:
-        The summary: drones, seconds, realtime_factor, form of the law, the referee's distances and counts,
-        tracking_rms_m.
+        The summary: ok, faults (sentences), drones, followed (how many ever did), asked (whether the hand ever
+        wished that they fly), without_hand (samples without a possible pose), seconds, realtime_factor, the
+        referee's distances and counts, tracking_rms_m.
 
     Raises:
         ConfigError: The scenario or the hand is refused, or a plot cannot be made.
     """
+    if not plays_by_itself(options.hand):
+        raise ConfigError(f"{options.hand}: nobody points in a simulation; fly it with swarmtouch up")
     law = [f"swarm.law={options.law}"] if options.law not in (None, CENTRAL) else []
     hints = hint_overrides(source_hints(options.hand))
     scenario, formation = open_scenario(options.scenario, (*hints, *law, *options.overrides), network=False)
@@ -67,15 +74,26 @@ def simulate(options: Options) -> dict[str, Any]:
         write_csv(record, options.csv)
     if options.plot:
         draw(record, scenario, options.plot)
-    return _summary(record, scenario, took_s)
+    return _summary(record, scenario, samples, took_s)
 
 
-def _summary(record: Record, scenario: Scenario, took_s: float) -> dict[str, Any]:
+def _summary(
+    record: Record, scenario: Scenario, samples: Sequence[HandSample], took_s: float
+) -> dict[str, Any]:
     ids = record.formation.ids
     verdict = judge(record, referee_rules(scenario, record.formation, ids))
     seconds = len(record.hand.t) / scenario.rates.control_hz
+    followed = {drone: drone in record.followed for drone in ids}
+    asked = any(sample.mode is Wish.FLY for sample in samples)
+    without = sum(sample.mode is Wish.HOLD for sample in samples)
+    faults = [*absences(followed, asked=asked, rejected=without), *contacts(verdict)]
     return {
+        "ok": not faults,
+        "faults": faults,
         "drones": len(ids),
+        "followed": sum(followed.values()),
+        "asked": asked,
+        "without_hand": without,
         "seconds": seconds,
         "realtime_factor": seconds / took_s,
         "form": str(form()),

@@ -4,6 +4,7 @@ import importlib
 from typing import cast
 
 from human_relay.sources.base import HandBackend, HandSource
+from human_relay.sources.playback import Playback
 from shared.errors import ConfigError
 from shared.uri import Uri, parse_uri
 
@@ -44,6 +45,16 @@ def source_hints(uri: str) -> dict[str, object]:
     """
     parsed = parse_uri(uri, example=_EXAMPLE)
     return _backend(parsed).hints(parsed)
+
+
+def plays_by_itself(uri: str) -> bool:
+    """Says whether a source needs nobody who moves something while it runs.
+
+    Raises:
+        ConfigError: As for `open_source`.
+    """
+    backend = _backend(parse_uri(uri, example=_EXAMPLE))
+    return isinstance(backend, type) and issubclass(backend, Playback)
 
 
 def _backend(uri: Uri) -> HandBackend:

@@ -132,6 +132,20 @@ def test_a_flight_ends_with_its_hand(tmp_path: Path) -> None:
     assert json.loads(output.splitlines()[-1])["ok"] is True
 
 
+def test_a_hand_in_millimetres_makes_no_flight(tmp_path: Path) -> None:
+    rows = [f"{k / 60},{1000 + k},2000,1200" for k in range(120)]
+    (tmp_path / "mm.csv").write_text("\n".join(["t,x,y,z", *rows]) + "\n")
+    hand = f"recording:{tmp_path / 'mm.csv'}?lead=0"
+    with launched(tmp_path, "rhombus", "--hand", hand, "--json") as process:
+        output, errors = process.communicate(timeout=100)
+    summary = json.loads(output.splitlines()[-1])
+    assert (process.returncode, summary["ok"], summary["landed"]) == (1, False, True), errors
+    assert summary["hand"]["asked"] is False
+    assert summary["hand"]["rejected"] > 50
+    assert f"not ok: {summary['faults'][0]}" in errors
+    assert "in metres?" in (tmp_path / "latest" / "logs" / "relay.log").read_text()
+
+
 def test_a_second_interrupt_does_not_wait_for_the_landing(tmp_path: Path) -> None:
     with launched(tmp_path, "rhombus", "--json") as process:
         wait_until_flying(process)

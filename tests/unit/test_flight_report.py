@@ -3,17 +3,23 @@
 import io
 import json
 import os
+import re
 from typing import cast
 
 import pytest
+<<<<<<< HEAD
 from msgspec.structs import replace
+=======
+from msgspec.structs import replace as evolve
+>>>>>>> b2f6c1e (ok means that everybody followed a hand that asked for it; why a flight is not ok is said; impossible poses of the hand in log, table and summary)
 from rich.console import Console
 
 from deploy.launcher.console import open_console
 from deploy.launcher.flight import GRACE_S, INTERRUPTED_LANDING_S, Outcome
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.status_view import SUMMARISE_ABOVE, AgentRow, plain_lines, status_table
-from deploy.launcher.summary import flight_summary, print_summary
+from deploy.launcher.summary import Json, flight_summary, print_summary
+from human_relay.relay import IMPOSSIBLE_POSE
 from shared.clock import system_clock
 from shared.codec import encode
 from shared.config import load_scenario
@@ -71,8 +77,10 @@ def outcome(**changes: object) -> Outcome:
         "seconds": 3.0,
         "unexpected_exits": {},
         "restarts": {"drone/1": 0},
+        "failed_starts": {},
         "landed": True,
         "refused": (),
+        "simulated": True,
         "referee": REFEREE,
     }
     return Outcome(**(fields | changes))  # type: ignore[arg-type]
@@ -102,6 +110,12 @@ class Swarm:
 def rendered(renderable: object, width: int = 80) -> str:
     console = Console(file=io.StringIO(), width=width)
     console.print(renderable)
+    return cast(io.StringIO, console.file).getvalue()
+
+
+def printed(summary: Json) -> str:
+    console = Console(file=io.StringIO(), width=80)
+    print_summary(summary, console)
     return cast(io.StringIO, console.file).getvalue()
 
 
@@ -222,7 +236,9 @@ def test_presence_is_followed() -> None:
 def test_the_summary_keeps_the_contract() -> None:
     swarm = Swarm()
     monitor = swarm.say(
-        hand(), status(1, seq=0, cpu=5.0), status(1, seq=1, cpu=0.1), status(1, seq=2, cpu=0.3), state(1)
+        hand(),
+        *(status(1, seq=seq, cpu=cpu) for seq, cpu in enumerate((5.0, 0.1, 0.3))),
+        *(state(drone, Mode.FOLLOW) for drone in FORMATION.ids),
     )
     summary = flight_summary(outcome(), monitor)
     assert json.loads(json.dumps(summary)) == summary
@@ -239,29 +255,56 @@ def test_the_summary_keeps_the_contract() -> None:
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "why"),
     [
-        {"landed": False},
-        {"unexpected_exits": {"drone-1": [-9]}},
-        {"referee": REFEREE | {"collisions": 1.0}},
-        {"referee": REFEREE | {"fence_exits": 2.0}},
+        ({"landed": False}, "not every drone was seen to land"),
+        ({"unexpected_exits": {"drone-1": [-9, 1]}}, "drone-1 ended unexpectedly (SIGKILL, exit code 1)"),
+        ({"failed_starts": {"drone-1": 3}}, "drone-1 could not be started (3 times)"),
+        ({"referee": REFEREE | {"collisions": 1.0}}, "1 collisions"),
+        ({"referee": REFEREE | {"fence_exits": 2.0}}, "2 times out of the fence"),
+        ({"referee": {}}, "what the referee saw is unknown"),
     ],
 )
-def test_what_makes_a_flight_not_ok(changes: dict[str, object]) -> None:
-    assert flight_summary(outcome(**changes), Swarm().monitor)["ok"] is False
+def test_what_makes_a_flight_not_ok_is_said(changes: dict[str, object], why: str) -> None:
+    summary = flight_summary(outcome(**changes), Swarm().monitor)
+    assert (summary["ok"], summary["faults"]) == (False, [why])
+    assert f"not ok: {why}" in printed(summary)
+
+
+def test_a_flight_in_which_not_everybody_followed_the_hand_is_not_ok() -> None:
+    monitor = Swarm().say(hand(), *(state(drone, Mode.FOLLOW) for drone in (1, 2)), state(3, Mode.TAKEOFF))
+    summary = flight_summary(outcome(), monitor)
+    assert summary["faults"] == ["the hand asked, but drones 3, 4 never followed it"]
+    assert [agent["followed"] for agent in summary["agents"]] == [True, True, False, False]
+    assert summary["hand"] == {"asked": True, "rejected": 0}
+
+
+def test_nobody_is_to_blame_where_the_hand_never_asked() -> None:
+    summary = flight_summary(outcome(), Swarm().say(hand(Wish.HOLD), state(1)))
+    assert summary["ok"] is True
+    assert summary["hand"] == {"asked": False, "rejected": 0}
+    assert re.search("the hand asked to fly +no", printed(summary))
+
+
+def test_a_hand_of_which_every_pose_is_impossible_makes_no_flight() -> None:
+    def relay(epoch: int, rejected: int) -> ProcessStatus:
+        return evolve(status(0), role="relay", epoch=epoch, rejected={IMPOSSIBLE_POSE: rejected})
+
+    monitor = Swarm().say(hand(Wish.HOLD), relay(1, 10), relay(1, 25), relay(2, 5))
+    summary = flight_summary(outcome(), monitor)
+    assert summary["hand"] == {"asked": False, "rejected": 30}, "the relay was restarted"
+    assert summary["faults"] == ["nobody flew: all poses of the hand are impossible (30); metres?"]
 
 
 def test_without_a_simulated_world_the_referees_numbers_are_unknown() -> None:
-    summary = flight_summary(outcome(referee={}), Swarm().monitor)
+    summary = flight_summary(outcome(simulated=False, referee={}), Swarm().monitor)
     assert summary["ok"] is True
     assert summary["min_distance_m"] is None
     assert summary["collisions"] is None
 
 
 def test_the_printed_summary_fits_80_columns_and_survives_missing_numbers() -> None:
-    console = Console(file=io.StringIO(), width=80)
-    print_summary(flight_summary(outcome(referee={}), Swarm().say(hand(), state(1))), console)
-    text = cast(io.StringIO, console.file).getvalue()
+    text = printed(flight_summary(outcome(referee={}), Swarm().say(hand(), state(1))))
     assert all(len(line) <= 80 for line in text.splitlines())
     assert "…" not in text
     assert "collisions" in text

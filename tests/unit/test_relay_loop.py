@@ -1,10 +1,12 @@
 import itertools
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from human_relay.loop import run
+from human_relay.relay import IMPOSSIBLE_POSE
 from human_relay.sources import open_source
 from shared.clock import NS_PER_S
 from shared.codec import decode
@@ -86,7 +88,20 @@ def test_it_reports_once_a_second_and_at_the_end() -> None:
     assert [report.state for report in status] == ["running", "running", "running", "ending"]
     assert {(report.role, report.id) for report in status} == {("relay", 0)}
     assert status[-1].metrics == {"samples": len(samples)}
-    assert status[-1].rejected == {"impossible-pose": 0}
+    assert status[-1].rejected == {IMPOSSIBLE_POSE: 0}
+
+
+def test_impossible_poses_are_counted_and_logged_now_and_then(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    rows = [f"{k / 60},{1000 + k},2000,1200" for k in range(720)]
+    (tmp_path / "mm.csv").write_text("\n".join(["t,x,y,z", *rows]) + "\n")
+    samples, status, _ = relay(f"recording:{tmp_path / 'mm.csv'}?lead=0", Operator(seconds=11.5))
+    assert {sample.mode for sample in samples} == {Wish.HOLD}
+    assert status[-1].rejected == {IMPOSSIBLE_POSE: len(samples)}
+    assert len(caplog.messages) == 3
+    assert all("in metres?" in message for message in caplog.messages)
+    assert "(1000, 2000, 1200) m" in caplog.messages[0]
 
 
 def test_it_only_publishes() -> None:

@@ -16,7 +16,8 @@ def test_the_command_writes_csv_plot_and_summary(tmp_path: Path, capsys: pytest.
     command = ["sim", "rhombus", "--hand", HAND, "--seconds", "1", "--csv", str(table), "--plot", str(plot)]
     assert main([*command, "--json"]) == 0
     summary = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert summary["drones"] == 4
+    assert (summary["ok"], summary["faults"]) == (True, [])
+    assert (summary["drones"], summary["followed"]) == (4, 4)
     assert summary["collisions"] == 0
     assert summary["realtime_factor"] > 0
     with table.open(encoding="utf-8") as file:
@@ -57,3 +58,29 @@ def test_a_flight_of_no_length_is_refused(capsys: pytest.CaptureFixture[str]) ->
         main(["sim", "rhombus", "--seconds", "-1"])
     assert end.value.code == 2
     assert "must be more than 0" in capsys.readouterr().err
+
+
+def millimetres(folder: Path) -> str:
+    """A hand that was recorded in millimetres."""
+    rows = [f"{k / 60},{1000 + k},{2000 - k},1200" for k in range(90)]
+    (folder / "mm.csv").write_text("\n".join(["t,x,y,z", *rows]) + "\n")
+    return f"recording:{folder / 'mm.csv'}"
+
+
+@pytest.mark.parametrize("law", ["paper", "central"])
+def test_a_flight_in_which_nobody_flew_is_not_ok(
+    law: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["sim", "rhombus", "--law", law, "--seconds", "1", "--json", "--hand", millimetres(tmp_path)]
+    assert main(command) == 1
+    output = capsys.readouterr()
+    summary = json.loads(output.out)
+    assert (summary["ok"], summary["asked"]) == (False, False)
+    assert summary["without_hand"] > 50
+    assert "poses of the hand are impossible" in summary["faults"][0]
+    assert summary["faults"][0] in output.err
+
+
+def test_a_pointer_has_nobody_in_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sim", "rhombus", "--hand", "pointer://"]) == 2
+    assert "swarmtouch up" in capsys.readouterr().err
