@@ -51,7 +51,7 @@ def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
         verbose: Whether to log debugging details.
 
     Returns:
-        An event that SIGTERM or SIGINT sets; the loop ends when it is set.
+        An event that SIGTERM, SIGINT or SIGHUP (the terminal is gone; not with `nohup`) sets: the loop ends.
     """
     _share_one_arena()
     line = f"%(asctime)s.%(msecs)03d {name} %(levelname)s %(name)s: %(message)s"
@@ -61,8 +61,9 @@ def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
     # The default of 5 ms would let a busy thread delay every received sample by as much.
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     stopping = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stopping.set())
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda *_: stopping.set())
     launcher = os.environ.get(LAUNCHER_PID)
     if launcher:
         _die_with(int(launcher))

@@ -9,7 +9,8 @@ DESCRIPTION = """Starts the world, one agent per drone and the hand relay as pro
 scenario, lands, ends every process and prints a summary. Each run leaves runs/<stamp>/ with the resolved
 scenario, one log per process and summary.json; runs/latest points at the newest.
 
-While it flies: Ctrl-C lands and ends within 6 s, again: within 1 s; the space bar stops all motors.
+While it flies: Ctrl-C lands and ends (from up to 1.2 m within 6 s), again: within 1 s; the space bar stops all
+motors; Ctrl-Z lands before it stops, and fg flies on. A terminal that is closed is a Ctrl-C, but with nohup.
 Exit code 0: every drone followed if the hand asked for it, everybody landed, no process ended unexpectedly,
 no collision, no fence exit; else 1, and the summary says why."""
 EXAMPLE = """swarmtouch up rhombus --seconds 30

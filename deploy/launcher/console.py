@@ -1,12 +1,12 @@
-"""A console that shows foreign text as it is, and whose reader may vanish without ending the flight."""
+"""A console that shows foreign text as it is."""
 
-import os
 import sys
 from typing import Any, TextIO, cast
 
 from rich.console import Console
 from rich.text import Text
 
+from deploy.launcher.streams import PatientStream, SteadyStream
 from shared.plain_text import plain
 
 _LONGEST_LINE = 4000
@@ -24,35 +24,12 @@ class PlainConsole(Console):
         return super().render_str(lines, **(options | {"markup": False, "emoji": False, "highlight": False}))
 
 
-class _SteadyStream:
-    """A stream that turns to nowhere when its reader vanishes (a closed terminal, `| head`)."""
+def open_console(stream: PatientStream | None = None, *, stderr: bool = False) -> Console:
+    """Opens a console.
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-
-    def write(self, text: str) -> int:
-        try:
-            self._stream.write(text)
-        except OSError:
-            self._turn_away()
-        return len(text)
-
-    def flush(self) -> None:
-        try:
-            self._stream.flush()
-        except OSError:
-            self._turn_away()
-
-    def _turn_away(self) -> None:
-        # What is still buffered would fail once more when the interpreter exits, with its code 120.
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), self._stream.fileno())
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self._stream, name)
-
-
-def open_console(*, stderr: bool) -> Console:
-    """Opens a console on stdout or stderr."""
-    stream = _SteadyStream(sys.stderr if stderr else sys.stdout)
-    return PlainConsole(file=cast(TextIO, stream), highlight=False)
+    Args:
+        stream: Where it prints.
+        stderr: Without a stream, whether on standard error instead of standard output.
+    """
+    target = stream or SteadyStream(sys.stderr if stderr else sys.stdout)
+    return PlainConsole(file=cast(TextIO, target), highlight=False)

@@ -6,12 +6,15 @@ import math
 import signal
 import time
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Protocol
 
 from attrs import frozen
 
-from deploy.launcher.keyboard import key_presses
+from agents.control.modes import HAND_LAND
+from deploy.launcher.job_control import has_shell, stop_here, watch_signals
+from deploy.launcher.keyboard import Keyboard
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.process_table import ProcessRow
 from deploy.launcher.supervisor import Child, Supervisor
@@ -22,6 +25,10 @@ LANDING_S = 6.0
 """A landing at the end of the flight may take so long,"""
 INTERRUPTED_LANDING_S = 4.5
 """and so long after Ctrl-C: with the rest below everything has ended within 6 s."""
+SETTLING_S = 2.0
+"""From a height that takes longer the landing has so much more than the descent itself."""
+RESUMING_S = 12.0
+"""When a stopped flight goes on, the hand's answer is awaited for so long."""
 GRACE_S = (2.0, 1.0, 0.4)
 """From TERM to KILL at the end, after the first and after the second Ctrl-C (which ends all within 1 s)."""
 _PERIOD_S = 0.04
@@ -36,6 +43,9 @@ class View(Protocol):
 
     def event(self, text: str) -> None:
         """Something happened that the operator should read."""
+
+    def leave(self) -> None:
+        """Leaves the terminal to others, until the next tick."""
 
 
 @frozen(kw_only=True)
@@ -73,6 +83,7 @@ class Flight:
         run_dir: Directory of this run.
         files: What processes read when they start, see `Supervisor`.
         seconds: Length of the flight; None: until the hand ends it.
+        landing_speed: How fast drones descend, m/s.
         view: Where to show it.
     """
 
@@ -85,6 +96,7 @@ class Flight:
         run_dir: Path,
         files: Mapping[Path, str],
         seconds: float | None,
+        landing_speed: float,
         view: View,
     ) -> None:
         self.formation = formation
@@ -99,34 +111,36 @@ class Flight:
             files=files,
         )
         self._rows = rows
-        self._seconds = seconds
+        self._left_s = math.inf if seconds is None else seconds
+        self._landing_speed = landing_speed
         self._view = view
+        self._keyboard = Keyboard(self._key)
         self._interrupts = 0
+        self._stop_asked = False
 
     async def run(self) -> Outcome:
         """Flies from the first process to the last; no process is left behind, whatever happens."""
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            loop.add_signal_handler(number, self._interrupt)
-        seconds, landed = 0.0, False
-        try:
-            with key_presses(self._key):
+        with watch_signals(self._interrupt, self._ask_stop), closing(self._keyboard):
+            try:
                 await self._start_members()
                 started = time.monotonic()
                 await self._fly()
                 await self._land()
                 seconds, landed = time.monotonic() - started, self.monitor.all_landed
-        finally:
-            self.phase = "ending"
-            await self.supervisor.stop(GRACE_S[min(self._interrupts, len(GRACE_S) - 1)])
-            self.monitor.drain()
+            except Exception:
+                await self._land_unseen()
+                raise
+            finally:
+                self.phase = "ending"
+                await self.supervisor.stop(GRACE_S[min(self._interrupts, len(GRACE_S) - 1)])
+        self.monitor.drain()
         return self._outcome(seconds, landed)
 
     async def _start_members(self) -> None:
         for row in self._rows:
             if row.role != RELAY:
                 self.supervisor.start(row)
-        await self._until(lambda: not self.supervisor.awaited or self._cut_short, None)
+        await self._until(lambda: not self.supervisor.awaited or self._cut_short, math.inf)
         if (missing := self.supervisor.missing) and not self._cut_short:
             self._view.event(f"no sign of {', '.join(missing)}; the hand starts without")
 
@@ -137,19 +151,65 @@ class Flight:
         for row in self._rows:
             if row.role == RELAY:
                 self.supervisor.start(row)
-        await self._until(lambda: self.monitor.ended_by_hand or self._cut_short, self._seconds)
+        await self._follow_hand()
+        while self._stop_asked and not self._cut_short:
+            await self._pause()
+            await self._follow_hand()
+
+    async def _follow_hand(self) -> None:
+        begun = time.monotonic()
+        await self._until(
+            lambda: self.monitor.ended_by_hand or self._cut_short or self._stop_asked, self._left_s
+        )
+        self._left_s -= time.monotonic() - begun
+
+    async def _pause(self) -> None:
+        """Lands and stops, as Ctrl-Z asks; flies on when the shell continues this process."""
+        self.phase = "pausing"
+        self.supervisor.order(_RELAY, "land")
+        await self._until(lambda: self.monitor.all_down or self._cut_short, math.inf)
+        self._stop_asked = False
+        if not self._cut_short:
+            self._view.event("everybody is down; fg flies on")
+            self._view.leave()
+            self._keyboard.close()
+            stop_here()
+            await self._resume()
+
+    async def _resume(self) -> None:
+        # A shell that ends continues its jobs so that they end: the signal for that may still be on its way.
+        await asyncio.sleep(_PERIOD_S)
+        if not self._cut_short:
+            self.supervisor.order(_RELAY, "fly")
+            await self._until(lambda: not self.monitor.ended_by_hand or self._cut_short, RESUMING_S)
+            self.phase = "flying"
 
     async def _land(self) -> None:
         self.phase = "landing"
         self.supervisor.order(_RELAY, "land")
-        limit = INTERRUPTED_LANDING_S if self._interrupts else LANDING_S
-        await self._until(lambda: self.monitor.all_down or self._interrupts > 1, limit)
+        await self._until(lambda: self.monitor.all_down or self._interrupts > 1, self._landing_s())
 
-    async def _until(self, done: Callable[[], bool], limit_s: float | None) -> None:
-        """Watches until it is done or, if there is a limit, time is up."""
-        deadline = math.inf if limit_s is None else time.monotonic() + limit_s
+    async def _land_unseen(self) -> None:
+        """Whatever is wrong with watching: who is in the air comes down before all processes end."""
+        self.supervisor.order(_RELAY, "land")
+        deadline = time.monotonic() + self._landing_s()
+        while time.monotonic() < deadline and self._interrupts < 2:
+            await asyncio.sleep(_PERIOD_S)
+
+    def _landing_s(self) -> float:
+        """Returns how long a landing from here may take, s."""
+        height = max((state.position[2] for state in self.monitor.stats.latest.values()), default=0.0)
+        usual = INTERRUPTED_LANDING_S if self._interrupts else LANDING_S
+        # Whom no order reaches lands by itself.
+        unheard = 0.0 if _RELAY in self.monitor.present else HAND_LAND
+        return max(usual, height / self._landing_speed + SETTLING_S) + unheard
+
+    async def _until(self, done: Callable[[], bool], limit_s: float) -> None:
+        """Watches until it is done or time is up."""
+        deadline = time.monotonic() + limit_s
         while not done() and time.monotonic() < deadline:
             await asyncio.sleep(_PERIOD_S)
+            self._keyboard.attend()
             self.monitor.drain()
             self._view.tick(self)
 
@@ -185,6 +245,13 @@ class Flight:
 
     def _interrupt(self) -> None:
         self._interrupts += 1
+
+    def _ask_stop(self) -> None:
+        if not has_shell():
+            self._view.event("no shell could continue a stopped flight: it goes on")
+            return
+        self._stop_asked = True
+        self._view.event("landing first, then stopping")
 
     def _key(self, key: str) -> None:
         if key == " ":

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import sys
 from pathlib import Path
 
 from attrs import frozen
@@ -12,6 +13,7 @@ from deploy.launcher.console import open_console
 from deploy.launcher.flight import Flight, Outcome
 from deploy.launcher.glove_panel import GlovePanel
 from deploy.launcher.hand_choice import HandChoice, choose_hand
+from deploy.launcher.job_control import in_foreground
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.pattern_file import write_pattern_file
 from deploy.launcher.ports import free_port_near, free_ports
@@ -22,8 +24,9 @@ from deploy.launcher.process_table import (
     process_table,
     resolve_scenario,
 )
-from deploy.launcher.run_directory import create_run_directory
+from deploy.launcher.run_directory import create_run_directory, write_run_file
 from deploy.launcher.status_view import StatusView
+from deploy.launcher.streams import PatientStream
 from deploy.launcher.summary import Json, flight_summary, print_summary
 from glove_bridge.patterns import load_patterns
 from human_relay.sources import source_hints
@@ -86,20 +89,20 @@ def launch(options: Options) -> Json:
         The summary (`deploy.launcher.summary`), which has also been printed and written to the run directory.
 
     Raises:
-        ConfigError: The scenario or the hand is refused; nothing has been started.
+        ConfigError: The scenario, the hand or the place for runs is refused; nothing has been started.
         DeviceError: The bus cannot be opened.
     """
     scenario, formation, hand = _resolve(options)
-    run_dir = create_run_directory(options.runs)
-    file = run_dir / SCENARIO_FILE
-    file.write_text(dump_scenario(scenario), encoding="utf-8")
-    console = open_console(stderr=options.json)
-    outcome, summary = asyncio.run(_fly(options, scenario, formation, hand, run_dir, console))
-    print_summary(summary, console)
-    line = json.dumps(summary)
-    if options.json and not outcome.refused:
-        print(line, flush=True)
-    _keep_summary(run_dir / SUMMARY_FILE, line, console)
+    with PatientStream(sys.stdout) as out, PatientStream(sys.stderr) as err:
+        console = open_console(err if options.json else out)
+        run_dir = create_run_directory(options.runs, lambda text: _say(console, text))
+        write_run_file(run_dir / SCENARIO_FILE, dump_scenario(scenario))
+        outcome, summary = asyncio.run(_fly(options, scenario, formation, hand, run_dir, console))
+        print_summary(summary, console)
+        line = f"{json.dumps(summary)}\n"
+        if options.json and not outcome.refused:
+            out.write(line)
+        _keep_summary(run_dir / SUMMARY_FILE, line, console)
     if outcome.refused:
         raise ConfigError(_refusal(outcome, run_dir))
     return summary
@@ -109,9 +112,13 @@ def _keep_summary(path: Path, line: str, console: Console) -> None:
     """Writes what has been printed; a disk that is full or gone costs the file, and it is said."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"{line}\n", encoding="utf-8")
+        path.write_text(line, encoding="utf-8")
     except OSError as error:
-        console.print(f"launcher | the summary above is not in {path}: {error}", soft_wrap=True)
+        _say(console, f"the summary above is not in {path}: {error}")
+
+
+def _say(console: Console, text: str) -> None:
+    console.print(f"launcher | {text}", soft_wrap=True)
 
 
 def _resolve(options: Options) -> tuple[Scenario, Formation, HandChoice]:
@@ -146,7 +153,7 @@ async def _fly(
         console=page,
         verbose=options.verbose,
     )
-    live = options.live and console.is_terminal
+    live = options.live and console.is_terminal and in_foreground(console.file.fileno())
     panel = GlovePanel(options.glove.patterns) if options.glove else None
     with (
         join(scenario, formation, OBSERVER) as bus,
@@ -164,6 +171,7 @@ async def _fly(
             run_dir=run_dir,
             files=_texts(run_dir / SCENARIO_FILE, run_dir / PATTERN_FILE),
             seconds=options.seconds,
+            landing_speed=scenario.limits.landing_speed,
             view=view,
         )
         outcome = await flight.run()
@@ -186,5 +194,6 @@ def _page_address(port: int) -> str:
 def _refusal(outcome: Outcome, run_dir: Path) -> str:
     """Says why a process refused to start, in its own last words."""
     name = outcome.refused[0]
-    lines = (run_dir / "logs" / f"{name}.log").read_text(encoding="utf-8", errors="replace").splitlines()
+    log = run_dir / "logs" / f"{name}.log"
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.is_file() else []
     return f"{name} refused to start: {lines[-1] if lines else 'it left no message'}"

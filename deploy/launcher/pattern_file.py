@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from deploy.launcher.run_directory import write_run_file
 from glove_bridge.patterns import CUES, load_patterns
 from glove_bridge.patterns.pattern import Pattern
 from observer.console.pattern_file import PATTERN_FILE
@@ -17,12 +18,15 @@ def write_pattern_file(run_dir: Path, patterns: str) -> Path:
 
     Returns:
         The file.
+
+    Raises:
+        ConfigError: The pattern set is refused, or the file cannot be written.
     """
     cues = load_patterns(CUES).patterns
     everything = {**cues, **load_patterns(patterns).patterns}
     tree = {"frames": {name: _frames(pattern) for name, pattern in everything.items()}, "cues": list(cues)}
     path = run_dir / PATTERN_FILE
-    path.write_text(json.dumps(tree), encoding="utf-8")
+    write_run_file(path, json.dumps(tree))
     return path
 
 

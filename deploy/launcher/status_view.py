@@ -13,6 +13,7 @@ from rich.table import Table
 
 from deploy.launcher.flight import Flight
 from deploy.launcher.glove_panel import GlovePanel
+from deploy.launcher.job_control import in_foreground
 from deploy.launcher.monitor import Monitor
 from shared.messages import DroneState, Flag, ProcessStatus
 from shared.nodes import DRONE
@@ -111,7 +112,7 @@ class StatusView:
     Args:
         console: Where.
         run_dir: Directory of the run, for the header.
-        live: Whether to redraw a table in place; it needs a terminal.
+        live: Whether to redraw a table in place; it needs a terminal, and waits while that is somebody else's.
         panel: Shows the glove below the table, None without one.
     """
 
@@ -126,12 +127,14 @@ class StatusView:
         self._phase = ""
 
     def __enter__(self) -> "StatusView":
-        if self._live:
-            self._live.start()
         self.event(f"{self._run_dir}. {_HINT}")
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.leave()
+
+    def leave(self) -> None:
+        """Leaves the terminal to others, until the next tick."""
         if self._live:
             self._live.stop()
 
@@ -151,7 +154,9 @@ class StatusView:
             table = status_table(
                 rows, f"{flight.phase}: {self._run_dir}", "\n".join(filter(None, (hand, _HINT)))
             )
-            self._live.update(Group(table, fingers) if fingers else table, refresh=True)
+            if in_foreground(self._console.file.fileno()):
+                self._live.start()
+                self._live.update(Group(table, fingers) if fingers else table, refresh=True)
             return
         for line in (*plain_lines(rows), *([f"hand | {hand}"] if hand else [])):
             self._print(line)

@@ -7,7 +7,6 @@ import attrs
 from rich import box
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from deploy.launcher.flight import Outcome, exit_word
 from deploy.launcher.monitor import Health, Monitor
@@ -72,7 +71,7 @@ def print_summary(summary: Json, console: Console) -> None:
         console.print(_glove_table(summary["glove"]))
     console.print(_flight_table(summary))
     for fault in summary["faults"]:
-        console.print(Text(f"not ok: {fault}"), soft_wrap=True)
+        console.print(f"not ok: {fault}", soft_wrap=True)
 
 
 def _faults(outcome: Outcome, followed: Mapping[int, bool], hand: Json) -> list[str]:

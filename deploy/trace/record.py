@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from deploy.launcher.run_directory import create_run_directory
+from deploy.launcher.run_directory import create_run_directory, write_run_file
 from observer.swarm import LATEST, RUNS, SCENARIO_FILE, open_observer, running_scenario
 from observer.trace.record import INBOX_DEPTH, run
 from observer.trace.write import TraceWriter
@@ -36,8 +36,8 @@ def main(*, source: str | None, output: Path | None) -> int:
 
 def _new_run(scenario: Scenario) -> Path:
     """Creates a run directory of a swarm that was started by hand."""
-    folder = create_run_directory(RUNS)
-    (folder / SCENARIO_FILE).write_text(dump_scenario(scenario), encoding="utf-8")
+    folder = create_run_directory(RUNS, lambda text: print(text, flush=True))
+    write_run_file(folder / SCENARIO_FILE, dump_scenario(scenario))
     return folder
 
 

@@ -3,12 +3,13 @@
 import json
 import os
 import pty
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -219,6 +220,49 @@ def test_a_reader_that_vanishes_does_not_end_the_flight(tmp_path: Path) -> None:
         output = process.stdout.read()
         assert process.wait(60) == 0
     assert json.loads(output.splitlines()[-1])["ok"] is True
+
+
+def test_a_reader_that_stalls_holds_nobody_up(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writing, b"x" * 65536)
+    os.set_blocking(writing, True)
+    with launched(tmp_path, "rhombus", "--json", stderr=writing) as process:
+        logs = [tmp_path / "latest" / "logs" / f"drone-{n}.log" for n in range(1, 5)]
+        until(lambda: all(log.exists() and "FOLLOW at" in log.read_text() for log in logs), STARTUP_S)
+        process.send_signal(signal.SIGINT)
+        assert process.stdout is not None
+        assert json.loads(process.stdout.readline())["landed"] is True
+        summary = tmp_path / "latest" / "summary.json"
+        until(lambda: summary.exists() and summary.read_text().endswith("\n"), STARTUP_S)
+        ends_alone(process.pid)
+        os.close(writing)
+        with os.fdopen(reading, "rb") as reader:
+            text = reader.read()
+        assert b"collisions" in text, "what was said waits for the reader"
+        assert process.wait(60) == 0
+
+
+def test_a_run_folder_that_vanishes_costs_neither_the_flight_nor_its_summary(tmp_path: Path) -> None:
+    with launched(tmp_path, "rhombus", "--json") as process:
+        wait_until_flying(process)
+        run = (tmp_path / "latest").resolve()
+        shutil.rmtree(run)
+        run.write_text("no folder")
+        os.kill(pid_of("drone/3", process.pid), signal.SIGKILL)
+        assert process.stderr is not None
+        for line in process.stderr:
+            if "cannot be written again" in line:
+                break
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=60)
+    summary = json.loads(output.splitlines()[-1])
+    assert summary["min_distance_m"] > 0.2, "by the world's last status"
+    assert "drone-3 goes on without a log" in errors
+    assert f"the summary above is not in {run / 'summary.json'}" in errors
+    ends_alone(process.pid)
 
 
 def test_a_configuration_that_a_process_refuses_ends_the_flight(tmp_path: Path) -> None:

@@ -69,6 +69,27 @@ def test_all_threads_share_one_arena() -> None:
     assert told.count("<heap nr=") == 1
 
 
+ENDING = """
+import signal, sys
+from shared.process import prepare_process
+
+if "nohup" in sys.argv:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+stopping = prepare_process("x")
+signal.raise_signal(signal.Signals[sys.argv[1]])
+print(stopping.is_set())
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "ends"), [("SIGTERM", True), ("SIGINT", True), ("SIGHUP", True), ("SIGHUP nohup", False)]
+)
+def test_a_signal_or_a_lost_terminal_ends_the_loop(name: str, ends: bool) -> None:
+    command = [sys.executable, "-c", ENDING, *name.split()]
+    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert told == f"{ends}\n"
+
+
 @pytest.fixture
 def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> socket.socket:
     """The socket of a service manager, and the environment that names it."""

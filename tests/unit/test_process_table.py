@@ -1,6 +1,7 @@
 """The process table and the resolved scenario."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import attrs
@@ -10,6 +11,7 @@ from deploy.launcher.ports import free_ports
 from deploy.launcher.process_table import ProcessRow, hint_overrides, process_table, resolve_scenario
 from deploy.launcher.run_directory import create_run_directory
 from shared.config import dump_scenario, load_scenario, structure_scenario, vehicle_settings
+from shared.errors import ConfigError
 from shared.formation import build_formation
 from shared.nodes import all_nodes, dials, endpoint
 from shared.scenario import Scenario
@@ -111,7 +113,44 @@ def test_free_ports_differ(count: int) -> None:
 
 
 def test_run_directories_never_collide_and_latest_points_at_the_newest(tmp_path: Path) -> None:
-    first, second = create_run_directory(tmp_path / "runs"), create_run_directory(tmp_path / "runs")
+    said: list[str] = []
+    first, second = (create_run_directory(tmp_path / "runs", said.append) for _ in range(2))
     assert first != second
     assert (first / "logs").is_dir()
     assert (tmp_path / "runs" / "latest").resolve() == second
+    assert said == []
+
+
+def a_file(runs: Path) -> None:
+    runs.write_text("no folder")
+
+
+def a_loop_of_links(runs: Path) -> None:
+    runs.symlink_to(runs)
+
+
+def a_link_to_nowhere_that_can_be(runs: Path) -> None:
+    runs.symlink_to("/dev/null/runs")
+
+
+def too_long_a_name(runs: Path) -> None:
+    runs.parent.rmdir()
+    runs.parent.symlink_to("x" * 300)
+
+
+@pytest.mark.parametrize("make", [a_file, a_loop_of_links, a_link_to_nowhere_that_can_be, too_long_a_name])
+def test_a_strange_place_for_runs_is_refused_by_name(make: Callable[[Path], None], tmp_path: Path) -> None:
+    runs = tmp_path / "here" / "runs"
+    runs.parent.mkdir()
+    make(runs)
+    with pytest.raises(ConfigError, match=f"{runs}: no directory can be made there"):
+        create_run_directory(runs, print)
+
+
+def test_a_folder_called_latest_stays_and_the_run_begins(tmp_path: Path) -> None:
+    said: list[str] = []
+    (tmp_path / "latest" / "mine").mkdir(parents=True)
+    run = create_run_directory(tmp_path, said.append)
+    assert (run / "logs").is_dir()
+    assert f"name it to other commands: {run}" in said[0]
+    assert {path.name for path in tmp_path.iterdir()} == {"latest", run.name}
