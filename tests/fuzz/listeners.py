@@ -32,7 +32,16 @@ from shared.transport import Arrival, Inbox
 SEPARATOR = b"\n"
 """Between a key, without line breaks, and the payload on it."""
 _ARRIVAL_NS = 5 * NS_PER_S
-_OUTCOME = Outcome(seconds=1.0, unexpected_exits={}, restarts={}, landed=True, refused=(), referee={})
+_OUTCOME = Outcome(
+    seconds=1.0,
+    unexpected_exits={},
+    restarts={},
+    failed_starts={},
+    landed=True,
+    simulated=False,
+    refused=(),
+    referee={},
+)
 
 
 class _Everything(MemoryBus):

@@ -7,11 +7,7 @@ import re
 from typing import cast
 
 import pytest
-<<<<<<< HEAD
 from msgspec.structs import replace
-=======
-from msgspec.structs import replace as evolve
->>>>>>> b2f6c1e (ok means that everybody followed a hand that asked for it; why a flight is not ok is said; impossible poses of the hand in log, table and summary)
 from rich.console import Console
 
 from deploy.launcher.console import open_console
@@ -288,7 +284,7 @@ def test_nobody_is_to_blame_where_the_hand_never_asked() -> None:
 
 def test_a_hand_of_which_every_pose_is_impossible_makes_no_flight() -> None:
     def relay(epoch: int, rejected: int) -> ProcessStatus:
-        return evolve(status(0), role="relay", epoch=epoch, rejected={IMPOSSIBLE_POSE: rejected})
+        return replace(status(0), role="relay", epoch=epoch, rejected={IMPOSSIBLE_POSE: rejected})
 
     monitor = Swarm().say(hand(Wish.HOLD), relay(1, 10), relay(1, 25), relay(2, 5))
     summary = flight_summary(outcome(), monitor)
