@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
+from agents.control.avoidance import Encounter
 from agents.control.hand import HandInput
 from agents.control.modes import HAND_STALE
-from agents.control.single.avoidance import Encounter
-from agents.control.single.repair import REFERENCE_LOST, Reference
-from agents.control.single.steering import Bystander
+from agents.control.repair import REFERENCE_LOST, Reference
+from agents.control.steering import Bystander
 from agents.control.step import Inputs, Settings, State, start, step
 from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
@@ -108,7 +108,7 @@ class Agent:
             displacements={name: links[i].displacement for i, name in enumerate(self._links)},
             pose_age=pose_age,
             battery=pose.battery,
-            flags=output.flags | Flag.REJECTED_INPUT if self._doubts(now_ns) else output.flags,
+            flags=Flag(output.flags) | Flag.REJECTED_INPUT if self._doubts(now_ns) else Flag(output.flags),
             heard=self._note_used(self._state),
             step_ns=now_ns,
         )
@@ -151,7 +151,7 @@ class Agent:
             wish=None if hand is None else hand.message.mode,
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
-            references=tuple([self._reference(heard.get(kin), key, now_ns) for kin, key in self._kin.items()]),
+            references=[self._reference(heard.get(kin), key, now_ns) for kin, key in self._kin.items()],
             drones=drones,
             silent=silent,
         )
@@ -210,14 +210,15 @@ def _around(senses: Senses, now_ns: int) -> tuple[list[Encounter], list[Bystande
     for drone, sensed in senses.drones.items():
         (x, y, _), (u, v, _) = sensed.message.position, sensed.message.velocity
         if now_ns - sensed.arrival_ns <= _SILENT_NS:
-            encounters.append((x, y, u, v))
+            encounters.append(Encounter(x, y, u, v))
             continue
         age = sensed.age(now_ns)
         if age > FORGOTTEN_AFTER:
             doubted_ns = senses.doubted_ns.get(DRONE_STATE.key(id=drone))
             if doubted_ns is None or now_ns - doubted_ns > _FORGOTTEN_NS:
                 continue
-        encounters.append((x, y, u, v) if age <= DRONE_STATE.stale_s else (x, y, 0.0, 0.0))
+        moving = age <= DRONE_STATE.stale_s
+        encounters.append(Encounter(x, y, u, v) if moving else Encounter(x, y, 0.0, 0.0))
         radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
         silent.append(Bystander(x, y, radius))
     return encounters, silent

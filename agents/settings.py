@@ -1,28 +1,28 @@
-"""From a scenario to the settings of one drone's control law, or of all of them."""
+"""From a scenario to the settings of one drone's control law: typed once, so that flying looks nothing up."""
 
-import numpy as np
+import functools
 
+from agents.control.avoidance import Field
+from agents.control.goals import Row
 from agents.control.hand import HandSettings
-from agents.control.single.goals import drone_row
-from agents.control.single.repair import Kin, kin_order
-from agents.control.single.steering import SteeringSettings as SingleSteeringSettings
-from agents.control.single.vectors import vector
-from agents.control.steering import SteeringSettings
+from agents.control.impedance import Link, Spring
+from agents.control.repair import Kin, kin_order
+from agents.control.steering import Columns, SteeringSettings
 from agents.control.step import Settings
 from shared.config import vehicle_settings
 from shared.fence import goal_box, hand_box
 from shared.formation import Formation
-from shared.scenario import Scenario
+from shared.messages import Vector
+from shared.scenario import FieldSettings, Hand, Scenario
 
 
 def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Settings:
     """Returns the settings of one drone."""
     return Settings(
-        row=drone_row(formation, drone),
+        row=drone_row(scenario, formation, drone),
         hand=hand_settings(scenario, formation),
-        steering=single_steering_settings(scenario, formation, drone),
+        steering=steering_settings(scenario, formation, drone),
         stable=scenario.swarm.law == "stable",
-        reference_heights=_reference_heights(scenario, formation, drone),
         kin=_kin(scenario, formation, drone),
         takeoff_height=scenario.limits.takeoff_height,
         takeoff_speed=scenario.limits.takeoff_speed,
@@ -30,60 +30,106 @@ def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Sett
     )
 
 
+def drone_row(scenario: Scenario, formation: Formation, drone: int) -> Row:
+    """Returns the row of one drone; its weights are for `[human, formation.references(drone)...]`."""
+    row, references = formation.row(drone), formation.references(drone)
+    columns = [0, *(1 + formation.row(other) for other in references)]
+    own_heights = scenario.swarm.law == "stable" or scenario.formation.height_from == "references"
+    heights = [float(formation.rest[formation.row(other), 2]) for other in references]
+    return Row(
+        weights=tuple(formation.weights[row][columns].tolist()),
+        offset=_vector(formation.offsets[row].tolist()),
+        links=tuple(
+            Link(link.name, _spring(link.mass, link.damping, link.stiffness, link.gain), link.limit)
+            for link in formation.links_into(drone)
+        ),
+        scale=formation.correction_scale,
+        heights=None if own_heights else tuple(heights),
+    )
+
+
 def hand_settings(scenario: Scenario, formation: Formation) -> HandSettings:
     """Returns how the hand is mapped, with the box that keeps the whole goal formation inside the fence."""
     low, high = hand_box(scenario, formation)
-    return HandSettings(hand=scenario.hand, low=vector(low), high=vector(high), radius=formation.radius)
+    return mapping(scenario.hand, _vector(low.tolist()), _vector(high.tolist()), formation.radius)
 
 
-def single_steering_settings(scenario: Scenario, formation: Formation, drone: int) -> SingleSteeringSettings:
-    """Returns the steering settings of one drone."""
-    low, high = goal_box(scenario, formation)
-    return SingleSteeringSettings(
-        limits=scenario.limits,
-        avoidance=scenario.avoidance,
-        columns=tuple((o.x, o.y) for o in scenario.obstacles),
-        low=vector(low),
-        high=vector(high),
-        tau=_tau(scenario, drone),
-        always_lead=scenario.swarm.law == "stable",
-        lead_above=scenario.hand.max_speed,
-    )
+def mapping(hand: Hand, low: Vector, high: Vector, radius: float) -> HandSettings:
+    """Returns how the hand is mapped.
 
-
-def steering_settings(scenario: Scenario, formation: Formation, drones: tuple[int, ...]) -> SteeringSettings:
-    """Returns the steering settings of some drones, one row each."""
-    low, high = goal_box(scenario, formation)
-    return SteeringSettings(
-        limits=scenario.limits,
-        avoidance=scenario.avoidance,
-        columns=np.array([(o.x, o.y) for o in scenario.obstacles]).reshape(-1, 2),
+    Args:
+        hand: The scenario's `[hand]`; an absolute mapping is a relative one without shift and gain.
+        low: Lower corner that the mapped hand is clamped to, m.
+        high: Upper corner, m.
+        radius: Distance of the outermost drone at rest, m.
+    """
+    relative = hand.mapping == "relative"
+    return HandSettings(
+        gain=hand.gain if relative else 1.0,
+        offset=hand.offset if relative else (0.0, 0.0, 0.0),
+        height=hand.height,
+        follow_yaw=hand.follow_yaw,
+        max_speed=hand.max_speed,
         low=low,
         high=high,
-        tau=np.array([[_tau(scenario, drone)] for drone in drones]),
+        radius=radius,
+    )
+
+
+def steering_settings(scenario: Scenario, formation: Formation, drone: int) -> SteeringSettings:
+    """Returns the steering settings of one drone."""
+    low, high = goal_box(scenario, formation)
+    return SteeringSettings(
+        speed=scenario.limits.speed,
+        acceleration=scenario.limits.acceleration,
+        separation=field_of(scenario.avoidance.separation),
+        columns=_columns(scenario),
+        low=_vector(low.tolist()),
+        high=_vector(high.tolist()),
+        tau=float(vehicle_settings(scenario, drone).tau),  # type: ignore[arg-type]  # resolved: never None
         always_lead=scenario.swarm.law == "stable",
         lead_above=scenario.hand.max_speed,
     )
 
 
-def _tau(scenario: Scenario, drone: int) -> float:
-    return float(vehicle_settings(scenario, drone).tau)  # type: ignore[arg-type]  # resolved: never None
+def field_of(settings: FieldSettings) -> Field:
+    """Returns a potential field as the law takes it."""
+    return Field(settings.eta, settings.d0, settings.radius)
 
 
-def _reference_heights(scenario: Scenario, formation: Formation, drone: int) -> tuple[float, ...] | None:
-    if scenario.swarm.law == "stable" or scenario.formation.height_from == "references":
+def _columns(scenario: Scenario) -> Columns | None:
+    if not scenario.obstacles:
         return None
-    return tuple(float(formation.rest[formation.row(other), 2]) for other in formation.references(drone))
+    rules = scenario.avoidance
+    return Columns(
+        tuple((float(o.x), float(o.y)) for o in scenario.obstacles),
+        projected=rules.rule == "projection",
+        field=field_of(rules.columns),
+        xi=rules.xi,
+        speed=rules.speed,
+        radius=rules.projection_radius,
+        margin=rules.projection_margin,
+    )
+
+
+@functools.cache
+def _spring(mass: float, damping: float, stiffness: float, gain: float) -> Spring:
+    """Makes equal springs one: what one link has computed in a step the others need not compute again."""
+    return Spring(mass, damping, stiffness, gain)
 
 
 def _kin(scenario: Scenario, formation: Formation, drone: int) -> tuple[Kin, ...]:
     order = kin_order({each: formation.references(each) for each in formation.ids}, drone)
     return tuple(
         Kin(
-            drone=each,
-            row=drone_row(formation, each),
-            references=tuple(order.index(other) for other in formation.references(each)),
-            heights=_reference_heights(scenario, formation, each),
+            each,
+            drone_row(scenario, formation, each),
+            tuple(order.index(other) for other in formation.references(each)),
         )
         for each in order
     )
+
+
+def _vector(numbers: list[float]) -> Vector:
+    x, y, z = numbers
+    return (x, y, z)

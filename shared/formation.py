@@ -4,6 +4,7 @@ A formation is a matrix with rows >= 0 and sum 1 over `[human, drone 1, ..., dro
 The reference graph must be a DAG rooted at the human.
 """
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
@@ -213,11 +214,11 @@ def _rest_shape(weights: Vec, offsets: Vec, levels: tuple[tuple[int, ...], ...])
 
 
 def _check_distances(rest: Vec, ids: tuple[int, ...], smallest: float, where: str) -> None:
-    first, second = near_pairs(rest[:, :2], np.zeros(len(rest), dtype=np.intp), smallest)
-    gaps = np.linalg.norm(rest[first, :2] - rest[second, :2], axis=1)
-    if gaps.size and gaps.min() < smallest:
-        nearest = int(np.argmin(gaps))
-        one, other = sorted((ids[first[nearest]], ids[second[nearest]]))
+    points = [(x, y) for x, y, _ in rest.tolist()]
+    gaps = {(i, j): math.dist(points[i], points[j]) for i, j in near_pairs(points, smallest)}
+    nearest = min(gaps, key=gaps.__getitem__, default=None)
+    if nearest is not None and gaps[nearest] < smallest:
+        one, other = (ids[row] for row in nearest)
         raise ConfigError(
             f"{where}: drones {one} and {other} rest {gaps[nearest]:.3f} m apart, nearer"
             f" than limits.safety_distance = {smallest} m; widen spacing, width or their offsets"

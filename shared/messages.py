@@ -7,14 +7,14 @@ Every message carries an envelope: `epoch` (the publisher's start, ns; a restart
 
 import enum
 import sys
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 from msgspec import Meta, Struct
 
 SCHEMA_VERSION = 1
 
-MAX_POSITION = 1_000.0
-MAX_VELOCITY = 50.0
+MAX_POSITION: Final = 1_000.0
+MAX_VELOCITY: Final = 50.0
 MAX_DRONE_ID = 65_535
 
 

@@ -1,4 +1,4 @@
-"""Many runs side by side in the batched simulator, watched independently of it."""
+"""Many runs side by side, each flown by one central computer, watched independently of it."""
 
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from agents.settings import hand_settings
-from deploy.lockstep.batched import Batch, hands_at
-from deploy.lockstep.hand_track import track_hand
+from deploy.lockstep.central import Flock
+from deploy.lockstep.hand_track import map_samples
 from deploy.lockstep.record import Record
 from deploy.lockstep.start import rest_places
 from shared.fence import fence_box
@@ -45,12 +45,21 @@ def fly_all(
     """Flies all hands at once, each from the rest formation; a shorter hand stays at its end."""
     formation = build_formation(scenario)
     settings = hand_settings(scenario, formation)
-    tracks = [track_hand(samples, settings) for samples in hands]
-    batch = Batch(scenario, formation, np.array([rest_places(formation, track) for track in tracks]), held)
-    for tick in range(max(len(samples) for samples in hands)):
-        now = hands_at(tracks, tick)
-        moment = batch.advance(now)
-        yield Tick(now.position, now.point, moment.position, moment.goal)
+    tracks = [map_samples(samples, settings) for samples in hands]
+    flocks = [
+        Flock(scenario, formation, rest_places(formation, track[0][1]), {row for run, row in held if run == k})
+        for k, track in enumerate(tracks)
+    ]
+    for tick in range(max(map(len, tracks))):
+        now = [track[min(tick, len(track) - 1)] for track in tracks]
+        for flock, (sample, mapped) in zip(flocks, now, strict=True):
+            flock.advance(sample, mapped)
+        yield Tick(
+            np.array([[sample.position] for sample, _ in now]),
+            np.array([[mapped.point] for _, mapped in now]),
+            np.array([[member.position for member in flock.members] for flock in flocks]),
+            np.array([[member.goal for member in flock.members] for flock in flocks]),
+        )
 
 
 def distances(scenario: Scenario, ticks: Iterator[Tick]) -> Distances:

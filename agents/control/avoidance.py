@@ -3,24 +3,41 @@
 Columns: potential field, Eqs. 14-16, `U = xi/2 |p - goal|^2 + sum eta/2 (1/rho - 1/d0)^2` with rho the distance
 to the surface. Every other drone and the hand: the same repulsion. All three: `escape`, which looks ahead,
 because a body follows its set-point about half a second late.
-
-Encounters are flat lists of pairs, so that one agent and a large batch run the same code.
 """
 
-import numpy as np
-import numpy.typing as npt
-from attrs import field, frozen
+import math
+from typing import Final, final
 
-from shared.formation import Vec
-from shared.scenario import FieldSettings
+from agents.control.vectors import Planar
+from shared.cells import Place
 
-FLOOR = 0.02
+FLOOR: Final = 0.02
 """Smallest rho that is computed with, m."""
-STANDSTILL = 0.05
+STANDSTILL: Final = 0.05
 """Below this closing speed there is no line of approach, m/s."""
+COINCIDENT: Final = 1e-9
+"""Nearer than this there is no direction away from a centre: a point leaves along +x, m."""
 
 
-@frozen(kw_only=True)
+@final
+class Field:
+    """Potential field of one kind of obstacle (Eqs. 14-16).
+
+    Attributes:
+        eta: Gain of the repulsion, m^4/s.
+        d0: Distance from the surface at which it starts, m.
+        radius: Radius of the obstacle, m.
+    """
+
+    __slots__ = ("d0", "eta", "radius")
+
+    def __init__(self, eta: float, d0: float, radius: float) -> None:
+        self.eta: Final = eta
+        self.d0: Final = d0
+        self.radius: Final = radius
+
+
+@final
 class Bubble:
     """Distance that `escape` keeps.
 
@@ -32,168 +49,169 @@ class Bubble:
         response: Time constant of leaving the bubble, s.
     """
 
-    radius: float
-    lead: float
-    slip: float = 0.0
-    response: float = 0.10
+    __slots__ = ("lead", "radius", "response", "slip")
+
+    def __init__(self, radius: float, lead: float, slip: float = 0.0, response: float = 0.10) -> None:
+        self.radius: Final = radius
+        self.lead: Final = lead
+        self.slip: Final = slip
+        self.response: Final = response
 
 
 # Radius, lead and slip: the smallest distances over strokes in all directions, free, against a fence and
 # against a wall of columns, decided (tests/unit/test_safety.py).
-DRONE_BUBBLE = Bubble(radius=0.35, lead=0.5, slip=0.2)
-HAND_BUBBLE = Bubble(radius=0.46, lead=0.5, slip=0.7)
-COLUMN_BUBBLE = Bubble(radius=0.22, lead=0.45)
+DRONE_BUBBLE: Final = Bubble(radius=0.35, lead=0.5, slip=0.2)
+HAND_BUBBLE: Final = Bubble(radius=0.46, lead=0.5, slip=0.7)
+COLUMN_BUBBLE: Final = Bubble(radius=0.22, lead=0.45)
 
 
-@frozen(kw_only=True)
-class Encounters:
-    """Pairs of one of our n points and something else.
+@final
+class Encounter(Place):
+    """Something else: where it is (x, y), m, and how it moves (u, v), m/s."""
 
-    Attributes:
-        row: (k,) which of our points.
-        position: (k, 2) where the other is, m.
-        velocity: (k, 2) how it moves, m/s.
-    """
+    __slots__ = ("u", "v")
 
-    row: npt.NDArray[np.intp] = field(eq=False)
-    position: Vec = field(eq=False)
-    velocity: Vec = field(eq=False)
+    def __init__(self, x: float, y: float, u: float, v: float) -> None:
+        super().__init__(x, y)
+        self.u: Final = u
+        self.v: Final = v
 
 
-@frozen(kw_only=True)
-class Threats:
-    """Encounters that demand an escape.
+@final
+class Threat:
+    """An encounter that demands an escape.
 
     Attributes:
-        row: (k,) which of our points.
-        heading: (k, 2) away from the other.
-        needed: (k, 1) speed along the heading that is fast enough, m/s.
-        direction: (k, 2) where to escape to: along the heading and, by `slip`, aside.
+        heading: Away from the other.
+        needed: Speed along the heading that is fast enough, m/s.
+        direction: Where to escape to: along the heading and, by `slip`, aside.
     """
 
-    row: npt.NDArray[np.intp] = field(eq=False)
-    heading: Vec = field(eq=False)
-    needed: Vec = field(eq=False)
-    direction: Vec = field(eq=False)
+    __slots__ = ("direction", "heading", "needed")
+
+    def __init__(self, heading: Planar, needed: float, direction: Planar) -> None:
+        self.heading: Final = heading
+        self.needed: Final = needed
+        self.direction: Final = direction
 
 
-NOBODY = Threats(
-    row=np.empty(0, dtype=np.intp),
-    heading=np.empty((0, 2)),
-    needed=np.empty((0, 1)),
-    direction=np.empty((0, 2)),
-)
-
-
-def repulsion(gaps: Vec, settings: FieldSettings) -> Vec:
-    """Returns the repulsive velocity `eta (1/rho - 1/d0) / rho^2` away from each obstacle, Eq. 16.
+def repulsion(x: float, y: float, field: Field) -> Planar:
+    """Returns the velocity `eta (1/rho - 1/d0) / rho^2` away from an obstacle, m/s, Eq. 16; zero out of range.
 
     Args:
-        gaps: (..., 2) vectors from obstacle centres to the point, m.
-        settings: Gain, range and radius.
-
-    Returns:
-        (..., 2) m/s; zero beyond `radius + d0`.
+        x: From the centre of the obstacle to the point, m.
+        y: The same.
+        field: Gain, range and radius.
     """
-    distance = _length(gaps)
-    rho = np.maximum(distance - settings.radius, FLOOR)
-    near = rho < settings.d0
-    if not near.any():
-        return np.zeros_like(gaps)
-    strength = settings.eta * (1.0 / rho - 1.0 / settings.d0) / (rho * rho)
-    return np.where(near, strength, 0.0) * _heading(gaps, distance)
+    squared, reach = x * x + y * y, field.radius + field.d0
+    if squared >= reach * reach:
+        return (0.0, 0.0)
+    distance = math.sqrt(squared)
+    rho = max(distance - field.radius, FLOOR)
+    if rho >= field.d0:
+        return (0.0, 0.0)
+    strength = field.eta * (1.0 / rho - 1.0 / field.d0) / (rho * rho)
+    if distance <= COINCIDENT:
+        return (strength, 0.0)
+    return (strength * (x / distance), strength * (y / distance))
+
+
+def separation(x: float, y: float, others: list[Encounter], field: Field) -> Planar:
+    """Returns the summed repulsion of the encounters from a point (x, y), m/s."""
+    u = v = 0.0
+    for other in others:
+        pu, pv = repulsion(x - other.x, y - other.y, field)
+        u, v = u + pu, v + pv
+    return (u, v)
 
 
 def column_velocity(
-    points: Vec, goals: Vec, columns: Vec, settings: FieldSettings, xi: float
-) -> tuple[Vec, npt.NDArray[np.bool_]]:
-    """Returns `-grad U` (n, 2), m/s, and a mask (n, 1) of the points that any column acts on.
+    point: Planar, goal: Planar, columns: tuple[Planar, ...], field: Field, xi: float
+) -> tuple[Planar, bool]:
+    """Returns `-grad U`, m/s, and whether any column acts on the point.
 
     Args:
-        points: (n, 2) m.
-        goals: (n, 2) m.
-        columns: (c, 2) centres, m.
-        settings: Field of a column.
+        point: m.
+        goal: m.
+        columns: Centres, m.
+        field: Of a column.
         xi: Gain of the attraction, 1/s.
     """
-    gaps = points[:, None, :] - columns
-    near = np.any(_length(gaps) < settings.radius + settings.d0, axis=1)
-    return xi * (goals - points) + repulsion(gaps, settings).sum(axis=1), near
+    x, y = point
+    u = v = 0.0
+    near, reach = False, field.radius + field.d0
+    for cx, cy in columns:
+        dx, dy = x - cx, y - cy
+        near = near or dx * dx + dy * dy < reach * reach
+        pu, pv = repulsion(dx, dy, field)
+        u, v = u + pu, v + pv
+    return (xi * (goal[0] - x) + u, xi * (goal[1] - y) + v), near
 
 
-def separation(points: Vec, others: Encounters, settings: FieldSettings) -> Vec:
-    """Returns the summed repulsion (n, 2) of the encounters, m/s."""
-    return _sum_rows(others.row, repulsion(points[others.row] - others.position, settings), len(points))
-
-
-def threats(points: Vec, velocities: Vec, others: Encounters, bubble: Bubble) -> Threats:
-    """Returns the encounters whose bubble a point is in; mostly there are none.
+def threats(point: Planar, velocity: Planar, others: list[Encounter], bubble: Bubble) -> list[Threat]:
+    """Returns the encounters whose bubble the point is in; mostly there are none.
 
     In a bubble the point must move away at `depth / response` plus the other's own speed towards it.
 
     Args:
-        points: (n, 2) m.
-        velocities: (n, 2) m/s.
+        point: m.
+        velocity: m/s.
         others: What to keep away from.
         bubble: How far.
     """
-    gaps = points[others.row] - others.position
-    distance = _length(gaps)
-    heading = _heading(gaps, distance)
-    relative = others.velocity - velocities[others.row]
-    depth = bubble.radius + bubble.lead * np.maximum(_along(relative, heading), 0.0) - distance
-    inside = np.flatnonzero(depth > 0.0)
-    if not len(inside):
-        return NOBODY
-    heading, relative = heading[inside], relative[inside]
-    approach = np.maximum(_along(others.velocity[inside], heading), 0.0)
-    return Threats(
-        row=others.row[inside],
-        heading=heading,
-        needed=depth[inside] / bubble.response + approach,
-        direction=heading + _aside(heading, relative, bubble.slip),
-    )
+    x, y = point
+    u, v = velocity
+    radius, lead = bubble.radius, bubble.lead
+    found = []
+    for other in others:
+        dx, dy = x - other.x, y - other.y
+        du, dv = other.u - u, other.v - v
+        squared = dx * dx + dy * dy
+        outside = squared - radius * radius
+        # No root is needed to see that it is far enough: 2 distance (distance - radius) is larger than that.
+        if outside > 0.0 and 2.0 * lead * (du * dx + dv * dy) < outside:
+            continue
+        distance = math.sqrt(squared)
+        hx, hy = (dx / distance, dy / distance) if distance > COINCIDENT else (1.0, 0.0)
+        closing = du * hx + dv * hy
+        depth = radius + lead * max(closing, 0.0) - distance
+        if depth > 0.0:
+            needed = depth / bubble.response + max(other.u * hx + other.v * hy, 0.0)
+            found.append(Threat((hx, hy), needed, _direction(hx, hy, du, dv, closing, bubble.slip)))
+    return found
 
 
-def escape(wanted: Vec, pressing: Threats) -> Vec:
-    """Returns the velocity (n, 2) to add to `wanted` so that every threat is evaded fast enough, m/s."""
-    missing = np.maximum(pressing.needed - _along(wanted[pressing.row], pressing.heading), 0.0)
-    return _sum_rows(pressing.row, missing * pressing.direction, len(wanted))
+def escape(wanted: Planar, pressing: list[Threat]) -> Planar:
+    """Returns the velocity to add to `wanted` so that every threat is evaded fast enough, m/s."""
+    u, v = wanted
+    eu = ev = 0.0
+    for threat in pressing:
+        hx, hy = threat.heading
+        dx, dy = threat.direction
+        missing = threat.needed - (u * hx + v * hy)
+        if missing > 0.0:
+            eu, ev = eu + missing * dx, ev + missing * dy
+    return (eu, ev)
 
 
-def columns_near(points: Vec, velocities: Vec, columns: Vec, bubble: Bubble) -> Encounters:
-    """Returns the columns whose bubbles can matter to points (n, 2) that move with velocities (n, 2)."""
-    reach = bubble.radius + bubble.lead * _length(velocities)
-    row, column = np.nonzero(_length(points[:, None, :] - columns)[..., 0] < reach)
-    return Encounters(row=row, position=columns[column], velocity=np.zeros((len(row), 2)))
+def columns_near(
+    point: Planar, velocity: Planar, columns: tuple[Planar, ...], bubble: Bubble
+) -> list[Encounter]:
+    """Returns the columns whose bubbles can matter to a point that moves with a velocity."""
+    x, y = point
+    u, v = velocity
+    reach = bubble.radius + bubble.lead * math.sqrt(u * u + v * v)
+    near = []
+    for cx, cy in columns:
+        if (x - cx) * (x - cx) + (y - cy) * (y - cy) < reach * reach:
+            near.append(Encounter(cx, cy, 0.0, 0.0))
+    return near
 
 
-def _aside(heading: Vec, closing: Vec, slip: float) -> Vec:
-    """Returns `slip` across the heading, away from the line of approach; to the left if right on it."""
-    across = np.stack([-heading[:, 1], heading[:, 0]], axis=1)
-    side = np.where(_along(closing, across) > 0.0, -slip, slip)
-    return np.where(_along(closing, heading) > STANDSTILL, side, 0.0) * across
-
-
-def _sum_rows(row: npt.NDArray[np.intp], pushes: Vec, n: int) -> Vec:
-    if n == 1:
-        return np.add.reduce(pushes, axis=0, keepdims=True)
-    total = np.empty((n, 2))
-    for axis in (0, 1):
-        total[:, axis] = np.bincount(row, weights=pushes[:, axis], minlength=n)
-    return total
-
-
-def _along(vectors: Vec, heading: Vec) -> Vec:
-    along: Vec = np.vecdot(vectors, heading)
-    return along[:, None]
-
-
-def _length(vectors: Vec) -> Vec:
-    lengths: Vec = np.sqrt(np.vecdot(vectors, vectors))
-    return lengths[..., None]
-
-
-def _heading(gaps: Vec, distance: Vec) -> Vec:
-    # A point exactly on a centre has no direction of its own; it leaves along +x.
-    return np.where(distance > 1e-9, gaps / np.maximum(distance, 1e-9), (1.0, 0.0))
+def _direction(hx: float, hy: float, du: float, dv: float, closing: float, slip: float) -> Planar:
+    """Returns the heading and, where something closes in, `slip` across it, off the line of approach."""
+    if closing <= STANDSTILL:
+        return (hx, hy)
+    # To the left if right on the line.
+    side = -slip if dv * hx - du * hy > 0.0 else slip
+    return (hx - side * hy, hy + side * hx)

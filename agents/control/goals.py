@@ -1,123 +1,131 @@
-"""Goals from references and link corrections: one matrix row per drone (Eqs. 11-13, DESIGN section 4)."""
+"""The goal of one drone from its references and links: one row of the formation's matrix (Eqs. 11-13)."""
 
-import numpy as np
-import numpy.typing as npt
-from attrs import field, frozen
+import math
+from typing import Final, final
 
-from agents.control.impedance import LinkState
-from shared.formation import Formation, Link, Vec
+from agents.control.hand import MappedHand
+from agents.control.impedance import Link, LinkState
+from agents.control.vectors import Vector, clamp, norm, rotate
+from shared.messages import MAX_POSITION, MAX_VELOCITY, Mode
 
 
-@frozen(kw_only=True)
-class Rows:
-    """The part of a formation that a computation covers: one row for an agent, all for a simulator.
+class Guide:
+    """What a drone follows in the place of one reference.
 
     Attributes:
-        weights: (n, 1 + m) reference weights over `[human, m references]`.
-        offsets: (n, 3) m, formation frame.
-        links: The L links into these drones.
-        targets: (L,) row that each link acts on.
-        limits: (L, 1) bound per displacement, m.
-        scale: Factor on every correction.
+        point: Where it is, or should be, m.
+        goal_velocity: m/s.
+        mode: Its mode, or that of whoever stands behind it.
     """
 
-    weights: Vec = field(eq=False)
-    offsets: Vec = field(eq=False)
-    links: tuple[Link, ...]
-    targets: npt.NDArray[np.intp] = field(eq=False)
-    limits: Vec = field(eq=False)
-    scale: float
+    __slots__ = ("goal_velocity", "mode", "point")
 
-    def sum_links(self, terms: Vec) -> Vec:
-        """Returns the sums (..., n, k) of terms (..., L, k) over the links into each row."""
-        total = np.zeros((*terms.shape[:-2], len(self.offsets), terms.shape[-1]))
-        np.add.at(total, (..., self.targets, slice(None)), terms)  # type: ignore[arg-type]  # the stub lacks tuples
-        return total
+    def __init__(self, point: Vector, goal_velocity: Vector, mode: Mode) -> None:
+        self.point: Final = point
+        self.goal_velocity: Final = goal_velocity
+        self.mode: Final = mode
 
 
-def agent_row(formation: Formation, drone: int) -> Rows:
-    """Returns the row of one drone; its columns are `[human, formation.references(drone)...]`."""
-    row = formation.row(drone)
-    columns = [0, *(1 + formation.row(other) for other in formation.references(drone))]
-    return _rows(formation, [row], formation.weights[row][columns][None, :], formation.links_into(drone))
+@final
+class Row:
+    """One row of a formation.
 
-
-def all_rows(formation: Formation) -> Rows:
-    """Returns the rows of all drones; the columns are `[human, drones...]`."""
-    return _rows(formation, list(range(len(formation.ids))), formation.weights, formation.links)
-
-
-def _rows(formation: Formation, rows: list[int], weights: Vec, links: tuple[Link, ...]) -> Rows:
-    places = {row: place for place, row in enumerate(rows)}
-    return Rows(
-        weights=weights,
-        offsets=formation.offsets[rows],
-        links=links,
-        targets=np.array([places[link.target] for link in links], dtype=np.intp),
-        limits=np.array([link.limit for link in links]).reshape(-1, 1),
-        scale=formation.correction_scale,
-    )
-
-
-def corrections(rows: Rows, links: LinkState) -> tuple[Vec, Vec]:
-    """Returns the corrections (..., n, 3), m, and their rates, m/s, in the formation's frame.
-
-    `correction_i = (-|sum dx|, sum dy, sum dz)` over the links into i. Each term is clamped per axis, its
-    state is not; a clamped term has no rate.
+    Attributes:
+        weights: Reference weights over `[human, references]`.
+        offset: m, formation frame.
+        links: The links into this drone.
+        scale: Factor on the correction.
+        heights: Rest heights of the references above the hand, m; None uses those of their points.
     """
-    term = np.minimum(np.maximum(links.displacement, -rows.limits), rows.limits)
-    moving = np.where(term == links.displacement, links.rate, 0.0)
-    total, rate = rows.sum_links(term), rows.sum_links(moving)
-    rate[..., 0] *= -np.sign(total[..., 0])
-    total[..., 0] = -np.abs(total[..., 0])
-    return rows.scale * total, rows.scale * rate
+
+    __slots__ = ("heights", "links", "offset", "scale", "weights")
+
+    def __init__(
+        self,
+        weights: tuple[float, ...],
+        offset: Vector,
+        links: tuple[Link, ...],
+        scale: float,
+        heights: tuple[float, ...] | None,
+    ) -> None:
+        self.weights: Final = weights
+        self.offset: Final = offset
+        self.links: Final = links
+        self.scale: Final = scale
+        self.heights: Final = heights
 
 
-def goals(rows: Rows, references: Vec, correction: Vec, yaw: float | Vec) -> Vec:
-    """Returns the goals (..., n, 3), world frame, m: `W [p_hand; p_1..p_m] + R(yaw) (offset + correction)`.
+def correction(row: Row, states: tuple[LinkState, ...]) -> tuple[Vector, Vector]:
+    """Returns the correction, m, and its rate, m/s, in the formation's frame.
+
+    `(-|sum dx|, sum dy, sum dz)` over the links; each term is clamped per axis, its state is not, and a clamped
+    term has no rate.
+    """
+    x = y = z = u = v = w = 0.0
+    links = row.links
+    for i in range(len(links)):
+        limit, state = links[i].limit, states[i]
+        dx, dy, dz = state.displacement
+        rx, ry, rz = state.rate
+        if abs(dx) <= limit:
+            x, u = x + dx, u + rx
+        else:
+            x += math.copysign(limit, dx)
+        if abs(dy) <= limit:
+            y, v = y + dy, v + ry
+        else:
+            y += math.copysign(limit, dy)
+        if abs(dz) <= limit:
+            z, w = z + dz, w + rz
+        else:
+            z += math.copysign(limit, dz)
+    k = row.scale
+    retreat = -u if x > 0.0 else u if x < 0.0 else 0.0
+    return (-k * abs(x), k * y, k * z), (k * retreat, k * v, k * w)
+
+
+def goal_of(
+    row: Row, states: tuple[LinkState, ...], hand: MappedHand, lead: list[Guide]
+) -> tuple[Vector, Vector]:
+    """Returns goal and goal velocity of one row: Eqs. 11-13, or the same on the references' goals.
+
+    The goal is the weighted mean of the references plus `R(yaw) (offset + correction)`; its velocity is made of
+    the hand's, the link rates and the references' goal velocities.
 
     Args:
-        rows: The rows to compute.
-        references: (..., 1 + m, 3) mapped hand and references: actual positions (`paper`) or goals (`stable`).
-        correction: (..., n, 3) formation frame, m.
-        yaw: Heading of the formation, rad.
+        row: The row.
+        states: State of its links.
+        hand: The mapped hand.
+        lead: Its references.
     """
-    return rows.weights @ references + rotate(rows.offsets + correction, yaw)
+    ox, oy, oz = row.offset
+    yaw, turning, heights = hand.yaw, hand.yaw_rate, row.heights
+    moved, rate = correction(row, states)
+    x, y, z = moved
+    u, v, w = rate
+    x, y, z = ox + x, oy + y, oz + z
+    gx, gy, gz = rotate((x, y, z), yaw)
+    gu, gv, gw = rotate((u - turning * y, v + turning * x, w), yaw)
+    weights = row.weights
+    x, y, z = hand.point
+    u, v, w = hand.velocity
+    weight = weights[0]
+    height = z
+    x, y, z, u, v, w = weight * x, weight * y, weight * z, weight * u, weight * v, weight * w
+    for i in range(len(lead)):
+        weight, guide = weights[i + 1], lead[i]
+        a, b, c = guide.point
+        d, e, f = guide.goal_velocity
+        if heights is not None:
+            c = height + heights[i]
+        x, y, z = x + weight * a, y + weight * b, z + weight * c
+        u, v, w = u + weight * d, v + weight * e, w + weight * f
+    # A goal that no receiver would accept, because a reference is at the edge of the range, helps nobody.
+    return _within((x + gx, y + gy, z + gz), MAX_POSITION), _within((u + gu, v + gv, w + gw), MAX_VELOCITY)
 
 
-def goal_velocities(rows: Rows, reference_velocities: Vec, place_velocities: Vec) -> Vec:
-    """Returns the rates of the goals (..., n, 3), m/s, from the hand's velocity and the link rates.
-
-    Args:
-        rows: The rows to compute.
-        reference_velocities: (..., 1 + m, 3) mapped hand velocity and the references' goal velocities.
-        place_velocities: (..., n, 3) of `place_velocities`.
-    """
-    return rows.weights @ reference_velocities + place_velocities
-
-
-def place_velocities(
-    rows: Rows, correction: Vec, correction_rate: Vec, yaw: float | Vec, yaw_rate: float | Vec
-) -> Vec:
-    """Returns how fast `R(yaw) (offset + correction)` changes, (..., n, 3), world frame, m/s.
-
-    Args:
-        rows: The rows to compute.
-        correction: (..., n, 3) formation frame, m.
-        correction_rate: (..., n, 3) formation frame, m/s.
-        yaw: Heading of the formation, rad.
-        yaw_rate: rad/s.
-    """
-    place, velocity = rows.offsets + correction, correction_rate.copy()
-    velocity[..., 0] -= yaw_rate * place[..., 1]
-    velocity[..., 1] += yaw_rate * place[..., 0]
-    return rotate(velocity, yaw)
-
-
-def rotate(vectors: Vec, yaw: float | Vec) -> Vec:
-    """Turns vectors (..., 3) about z by `yaw`, a number or (...) headings."""
-    if isinstance(yaw, float) and yaw == 0.0:
-        return vectors
-    c, s = np.cos(yaw), np.sin(yaw)
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    return np.stack([c * x - s * y, s * x + c * y, z], axis=-1)
+def _within(vector: Vector, limit: float) -> Vector:
+    """Returns the nearest vector whose components are at most `limit`."""
+    if norm(vector) <= limit:
+        return vector
+    return clamp(vector, (-limit, -limit, -limit), (limit, limit, limit))

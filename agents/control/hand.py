@@ -5,21 +5,19 @@ clock: agents that use the same samples map them to the same point, whenever the
 """
 
 import math
+from typing import Final, final
 
-from attrs import frozen
-from msgspec import Struct
+from agents.control.vectors import ORIGIN, Vector, clamp, norm, shorten
 
-from agents.control.single.vectors import ORIGIN, Vector, clamp, shorten
-from shared.scenario import Hand
-
-MAX_SAMPLE_GAP = 0.1
+MAX_SAMPLE_GAP: Final = 0.1
 """A longer gap between two samples grants no further way to the chase, s."""
 
-OUTERMOST_SPEED = 1.0
+OUTERMOST_SPEED: Final = 1.0
 """Yaw turns the formation so that its outermost drone stays below this, m/s."""
 
 
-class HandInput(Struct, frozen=True):
+@final
+class HandInput:
     """One hand sample in the world frame.
 
     Attributes:
@@ -29,13 +27,17 @@ class HandInput(Struct, frozen=True):
         stamp: Time of the sample on its source's clock, s; only differences are used.
     """
 
-    position: Vector
-    velocity: Vector
-    yaw: float
-    stamp: float
+    __slots__ = ("position", "stamp", "velocity", "yaw")
+
+    def __init__(self, position: Vector, velocity: Vector, yaw: float, stamp: float) -> None:
+        self.position: Final = position
+        self.velocity: Final = velocity
+        self.yaw: Final = yaw
+        self.stamp: Final = stamp
 
 
-class MappedHand(Struct, frozen=True):
+@final
+class MappedHand:
     """The mapped hand.
 
     Attributes:
@@ -46,28 +48,53 @@ class MappedHand(Struct, frozen=True):
         stamp: Stamp of the sample it was made from, s.
     """
 
-    point: Vector
-    velocity: Vector
-    yaw: float
-    yaw_rate: float
-    stamp: float
+    __slots__ = ("point", "stamp", "velocity", "yaw", "yaw_rate")
+
+    def __init__(self, point: Vector, velocity: Vector, yaw: float, yaw_rate: float, stamp: float) -> None:
+        self.point: Final = point
+        self.velocity: Final = velocity
+        self.yaw: Final = yaw
+        self.yaw_rate: Final = yaw_rate
+        self.stamp: Final = stamp
 
 
-@frozen(kw_only=True)
+@final
 class HandSettings:
-    """What the mapping needs to know.
+    """How the hand is mapped.
 
     Attributes:
-        hand: The scenario's `[hand]`.
+        gain: Factor on position and velocity.
+        offset: Added to the position, m.
+        height: Fixed height of the mapped hand, m; None: it follows the hand.
+        follow_yaw: Whether the formation turns with the hand.
+        max_speed: The mapped hand follows no faster than this, m/s.
         low: Lower corner that the mapped hand is clamped to, m.
         high: Upper corner, m.
         radius: Distance of the outermost drone at rest, m.
     """
 
-    hand: Hand
-    low: Vector
-    high: Vector
-    radius: float
+    __slots__ = ("follow_yaw", "gain", "height", "high", "low", "max_speed", "offset", "radius")
+
+    def __init__(
+        self,
+        *,
+        gain: float,
+        offset: Vector,
+        height: float | None,
+        follow_yaw: bool,
+        max_speed: float,
+        low: Vector,
+        high: Vector,
+        radius: float,
+    ) -> None:
+        self.gain: Final = gain
+        self.offset: Final = offset
+        self.height: Final = height
+        self.follow_yaw: Final = follow_yaw
+        self.max_speed: Final = max_speed
+        self.low: Final = low
+        self.high: Final = high
+        self.radius: Final = radius
 
 
 def map_hand(previous: MappedHand | None, sample: HandInput, settings: HandSettings) -> MappedHand:
@@ -82,12 +109,12 @@ def map_hand(previous: MappedHand | None, sample: HandInput, settings: HandSetti
         The mapped hand: at the target if it can be reached within `max_speed`, else on its way.
     """
     target, velocity = _target(sample, settings)
-    yaw = sample.yaw if settings.hand.follow_yaw else 0.0
+    yaw = sample.yaw if settings.follow_yaw else 0.0
     if previous is None:
-        return MappedHand(target, shorten(velocity, settings.hand.max_speed), yaw, 0.0, sample.stamp)
+        return MappedHand(target, shorten(velocity, settings.max_speed), yaw, 0.0, sample.stamp)
     gap = sample.stamp - previous.stamp
     dt = 0.0 if gap < 0.0 else MAX_SAMPLE_GAP if gap > MAX_SAMPLE_GAP else gap
-    point, velocity = _chase(previous.point, target, velocity, settings.hand.max_speed, dt)
+    point, velocity = _chase(previous.point, target, velocity, settings.max_speed, dt)
     yaw_rate = 0.0
     if yaw != previous.yaw:
         yaw, yaw_rate = _turn(previous.yaw, yaw, OUTERMOST_SPEED / max(settings.radius, 0.1), dt)
@@ -101,13 +128,13 @@ def freeze(mapped: MappedHand) -> MappedHand:
 
 def _target(sample: HandInput, settings: HandSettings) -> tuple[Vector, Vector]:
     """Applies mapping, fixed height and clamps; a clamped axis has no velocity."""
-    hand = settings.hand
-    (x, y, z), (u, v, w) = sample.position, sample.velocity
-    if hand.mapping == "relative":
-        k, (a, b, c) = hand.gain, hand.offset
-        x, y, z, u, v, w = a + k * x, b + k * y, c + k * z, k * u, k * v, k * w
-    if hand.height is not None:
-        z, w = hand.height, 0.0
+    x, y, z = sample.position
+    u, v, w = sample.velocity
+    a, b, c = settings.offset
+    k = settings.gain
+    x, y, z, u, v, w = a + k * x, b + k * y, c + k * z, k * u, k * v, k * w
+    if settings.height is not None:
+        z, w = settings.height, 0.0
     clamped = clamp((x, y, z), settings.low, settings.high)
     a, b, c = clamped
     return clamped, (u if a == x else 0.0, v if b == y else 0.0, w if c == z else 0.0)
@@ -117,9 +144,10 @@ def _chase(
     point: Vector, target: Vector, velocity: Vector, max_speed: float, dt: float
 ) -> tuple[Vector, Vector]:
     """Moves towards the target by at most `max_speed * dt`; arriving, it takes over the hand's velocity."""
-    (x, y, z), (a, b, c) = point, target
+    x, y, z = point
+    a, b, c = target
     du, dv, dw = a - x, b - y, c - z
-    distance = math.hypot(du, dv, dw)
+    distance = norm((du, dv, dw))
     if distance > max_speed * dt:
         u, v, w = du / distance * max_speed, dv / distance * max_speed, dw / distance * max_speed
         return (x + u * dt, y + v * dt, z + w * dt), (u, v, w)

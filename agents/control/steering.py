@@ -1,4 +1,4 @@
-"""From goals to set-points: tracking, avoidance, limits, lead and fence, for n drones at once.
+"""From the goal of one drone to its set-point: tracking, avoidance, limits, lead and fence.
 
 The reference trajectory follows the goal exactly while nothing is in the way and no limit is hit. The
 vehicle's set-point leads it by `tau` times its velocity (`stable` law: `setpoint = goal + tau goal_velocity`).
@@ -6,199 +6,304 @@ The paper's law has no lead, except beyond its derated hand speed and while esca
 away in time.
 """
 
-import numpy as np
-import numpy.typing as npt
-from attrs import evolve, field, frozen
+from typing import Final, final
 
 from agents.control import avoidance
-from agents.control.avoidance import COLUMN_BUBBLE, DRONE_BUBBLE, HAND_BUBBLE, Encounters
+from agents.control.avoidance import COLUMN_BUBBLE, DRONE_BUBBLE, HAND_BUBBLE, Bubble, Encounter, Field, Threat
 from agents.control.projection import project_swept
-from agents.control.trajectory import Trajectory, advance, limit, norm, tracking_velocity
-from shared.formation import Vec
-from shared.scenario import Avoidance, Limits
+from agents.control.trajectory import Trajectory, advance, approach, tracking_velocity
+from agents.control.vectors import Planar, Vector, clamp, distance, shorten
 
-Mask = npt.NDArray[np.bool_]
-
-ESCAPE_ACCELERATION = 3.0
+ESCAPE_ACCELERATION: Final = 3.0
 """Factor on the acceleration limit while escaping from a hand or a drone that comes closer."""
-ROUNDS = 5
+ROUNDS: Final = 5
 """How often the escapes from drones, hand and columns are reconciled."""
-HAND_SPEED_FACTOR = 1.5
+HAND_SPEED_FACTOR: Final = 1.5
 """The speed limit rises to this times the hand's speed."""
-ON_GOAL = 1e-6
+ON_GOAL: Final = 1e-6
 """The reference counts as on the goal within this distance, m."""
-SHORTEST_STEP = 1e-4
+SHORTEST_STEP: Final = 1e-4
 """A shorter step counts as this long, s."""
-LONGEST_STEP = 0.05
+LONGEST_STEP: Final = 0.05
 """A longer pause between two steps does not let the reference move further, s."""
 
 
-@frozen(kw_only=True)
+@final
+class Columns:
+    """The columns, and by which rule they are avoided.
+
+    Attributes:
+        centres: m.
+        projected: By projection, else by their field.
+        field: Of each.
+        xi: Gain of the attraction, 1/s.
+        speed: Largest set-point speed while the field acts, m/s.
+        radius: Circle of the projection, m.
+        margin: Added to it, m.
+    """
+
+    __slots__ = ("centres", "field", "margin", "projected", "radius", "speed", "xi")
+
+    def __init__(
+        self,
+        centres: tuple[Planar, ...],
+        *,
+        projected: bool,
+        field: Field,
+        xi: float,
+        speed: float,
+        radius: float,
+        margin: float,
+    ) -> None:
+        self.centres: Final = centres
+        self.projected: Final = projected
+        self.field: Final = field
+        self.xi: Final = xi
+        self.speed: Final = speed
+        self.radius: Final = radius
+        self.margin: Final = margin
+
+
+@final
 class SteeringSettings:
     """What steering needs to know of the scenario.
 
     Attributes:
-        limits: Speed and acceleration.
-        avoidance: Fields and rule.
-        columns: (c, 2) centres, m.
-        low: (3,) lowest set-point, m.
-        high: (3,) highest set-point, m.
-        tau: (n, 1) lag of the vehicles, s.
+        speed: Limit, m/s.
+        acceleration: Limit, m/s^2.
+        separation: Field of other drones and of the hand.
+        columns: None if there are none.
+        low: Lowest set-point, m.
+        high: Highest set-point, m.
+        tau: Lag of the vehicle, s.
         always_lead: `stable` law.
         lead_above: Hand speed from which the paper's law leads too, m/s.
     """
 
-    limits: Limits
-    avoidance: Avoidance
-    columns: Vec = field(eq=False)
-    low: Vec = field(eq=False)
-    high: Vec = field(eq=False)
-    tau: Vec = field(eq=False)
-    always_lead: bool
-    lead_above: float
+    __slots__ = (
+        "acceleration",
+        "always_lead",
+        "columns",
+        "high",
+        "lead_above",
+        "low",
+        "separation",
+        "speed",
+        "tau",
+    )
+
+    def __init__(
+        self,
+        *,
+        speed: float,
+        acceleration: float,
+        separation: Field,
+        columns: Columns | None,
+        low: Vector,
+        high: Vector,
+        tau: float,
+        always_lead: bool,
+        lead_above: float,
+    ) -> None:
+        self.speed: Final = speed
+        self.acceleration: Final = acceleration
+        self.separation: Final = separation
+        self.columns: Final = columns
+        self.low: Final = low
+        self.high: Final = high
+        self.tau: Final = tau
+        self.always_lead: Final = always_lead
+        self.lead_above: Final = lead_above
 
 
-@frozen(kw_only=True)
-class Surroundings:
-    """Who is around, and the bodies that are steered.
+@final
+class Bystander:
+    """A body that nobody hears: it may be anywhere near, at any height.
 
     Attributes:
-        position: (n, 3) own bodies, m.
-        velocity: (n, 3) own bodies, m/s.
-        drones: Other drones near each of ours.
-        hand: The real hand, once per drone of ours; None before the first sample.
-        hand_speed: m/s, a number or (n, 1).
+        x: Where it was last, m.
+        y: The same.
+        radius: How far to stay away, m.
     """
 
-    position: Vec = field(eq=False)
-    velocity: Vec = field(eq=False)
-    drones: Encounters
-    hand: Encounters | None
-    hand_speed: float | Vec = field(eq=False)
+    __slots__ = ("radius", "x", "y")
+
+    def __init__(self, x: float, y: float, radius: float) -> None:
+        self.x: Final = x
+        self.y: Final = y
+        self.radius: Final = radius
 
 
-@frozen(kw_only=True)
+@final
+class Surroundings:
+    """The body that is steered, and who is around.
+
+    Attributes:
+        position: Own body, m.
+        velocity: Own body, m/s.
+        drones: Every other drone.
+        silent: Those of them that have fallen silent.
+        hand: The real hand; None before the first sample.
+        hand_speed: m/s.
+    """
+
+    __slots__ = ("drones", "hand", "hand_speed", "position", "silent", "velocity")
+
+    def __init__(
+        self,
+        position: Vector,
+        velocity: Vector,
+        drones: list[Encounter],
+        silent: list[Bystander],
+        hand: Encounter | None,
+        hand_speed: float,
+    ) -> None:
+        self.position: Final = position
+        self.velocity: Final = velocity
+        self.drones: Final = drones
+        self.silent: Final = silent
+        self.hand: Final = hand
+        self.hand_speed: Final = hand_speed
+
+
+@final
 class Steered:
     """Result of one step.
 
     Attributes:
         trajectory: Reference after the step.
-        setpoint: (n, 3) m.
-        avoiding: (n, 1) something is in the way.
-        fenced: (n, 1) the fence is in the way.
+        setpoint: m.
+        avoiding: Something is in the way.
+        fenced: The fence is in the way.
     """
 
-    trajectory: Trajectory
-    setpoint: Vec = field(eq=False)
-    avoiding: Mask = field(eq=False)
-    fenced: Mask = field(eq=False)
+    __slots__ = ("avoiding", "fenced", "setpoint", "trajectory")
+
+    def __init__(self, trajectory: Trajectory, setpoint: Vector, *, avoiding: bool, fenced: bool) -> None:
+        self.trajectory: Final = trajectory
+        self.setpoint: Final = setpoint
+        self.avoiding: Final = avoiding
+        self.fenced: Final = fenced
 
 
 def steer(
     trajectory: Trajectory,
-    goal: Vec,
-    goal_velocity: Vec,
+    goal: Vector,
+    goal_velocity: Vector,
     around: Surroundings,
     settings: SteeringSettings,
     dt: float,
 ) -> Steered:
-    """Advances the reference by one step towards the goals.
+    """Advances the reference by one step towards the goal.
 
     Args:
         trajectory: Reference before the step.
-        goal: (n, 3) m.
-        goal_velocity: (n, 3) m/s.
-        around: Bodies, other drones, hand.
+        goal: m.
+        goal_velocity: m/s.
+        around: Body, other drones, hand.
         settings: Limits and fields.
         dt: Time since the last step, s.
 
     Returns:
-        The reference and the set-points after the step, inside the fence and the limits.
+        The reference and the set-point after the step, inside the fence and the limits.
     """
-    limits = settings.limits
+    low, high = settings.low, settings.high
     dt = min(max(dt, SHORTEST_STEP), LONGEST_STEP)
-    inside = np.minimum(np.maximum(goal, settings.low), settings.high)
+    inside = clamp(goal, low, high)
     wanted, column_near = _towards(trajectory, inside, settings, dt)
-    pushed = _keep_off(wanted, trajectory, around, settings)
-    escaping = norm(pushed) > 0.0
-    acceleration = np.where(escaping, ESCAPE_ACCELERATION, 1.0) * limits.acceleration
-    speed = np.maximum(limits.speed, HAND_SPEED_FACTOR * around.hand_speed)
-    moved = advance(trajectory, inside, wanted + pushed, dt, speed, acceleration)
-    point = np.minimum(np.maximum(moved.point, settings.low), settings.high)
-    avoiding = escaping | column_near
-    wish = np.where(_on_goal(moved) & ~avoiding, limit(goal_velocity, speed), moved.velocity)
-    share = _lead_share(escaping, around.hand_speed, settings)
-    lead = trajectory.lead + limit(share * wish - trajectory.lead, acceleration * dt)
-    setpoint = np.minimum(np.maximum(point + settings.tau * lead, settings.low), settings.high)
+    u, v, w = wanted
+    pu, pv = _keep_off((u, v), trajectory, around, settings)
+    escaping = pu * pu + pv * pv > 0.0
+    acceleration = settings.acceleration * (ESCAPE_ACCELERATION if escaping else 1.0)
+    speed = max(settings.speed, HAND_SPEED_FACTOR * around.hand_speed)
+    reached, velocity = advance(trajectory, (u + pu, v + pv, w), dt, speed, acceleration)
+    point = clamp(reached, low, high)
+    avoiding = escaping or column_near
+    on_goal = distance(reached, inside) < ON_GOAL
+    a, b, c = shorten(goal_velocity, speed) if on_goal and not avoiding else velocity
+    share = 1.0 if escaping or settings.always_lead else _lead_share(around.hand_speed, settings.lead_above)
+    lead = approach(trajectory.lead, (share * a, share * b, share * c), acceleration * dt)
+    x, y, z = point
+    a, b, c = lead
+    tau = settings.tau
     return Steered(
-        trajectory=evolve(moved, point=point, lead=lead),
-        setpoint=setpoint,
+        Trajectory(point, velocity, lead, inside),
+        clamp((x + tau * a, y + tau * b, z + tau * c), low, high),
         avoiding=avoiding,
-        fenced=(inside != goal).any(axis=1, keepdims=True) | (point != moved.point).any(axis=1, keepdims=True),
+        fenced=inside != goal or point != reached,
     )
 
 
-def _towards(trajectory: Trajectory, goal: Vec, settings: SteeringSettings, dt: float) -> tuple[Vec, Mask]:
-    """Returns the wanted velocity (n, 3) with the columns considered, and a mask where one acts."""
-    rules = settings.avoidance
-    free = tracking_velocity(trajectory, goal, dt, settings.limits.acceleration)
-    if not len(settings.columns):
-        return free, np.zeros((len(goal), 1), dtype=bool)
-    if rules.rule == "projection":
-        allowed = goal.copy()
-        allowed[:, :2] = project_swept(
-            trajectory.point[:, :2],
-            goal[:, :2],
-            settings.columns,
-            rules.projection_radius,
-            step=settings.limits.speed * dt,
-            margin=rules.projection_margin,
-        )
-        near = norm(allowed - goal) > 0.0
-        return np.where(near, (allowed - trajectory.point) / dt, free), near
-    bent, near = avoidance.column_velocity(
-        trajectory.point[:, :2], goal[:, :2], settings.columns, rules.columns, rules.xi
-    )
-    slow = limit(np.column_stack([bent, free[:, 2]]), rules.speed)
-    return np.where(near, slow, free), near
+def _towards(
+    trajectory: Trajectory, goal: Vector, settings: SteeringSettings, dt: float
+) -> tuple[Vector, bool]:
+    """Returns the wanted velocity with the columns considered, and whether one acts."""
+    free = tracking_velocity(trajectory, goal, dt, settings.acceleration)
+    columns = settings.columns
+    if columns is None:
+        return free, False
+    x, y, z = trajectory.point
+    gx, gy, gz = goal
+    if columns.projected:
+        longest = settings.speed * dt
+        a, b = project_swept((x, y), (gx, gy), columns.centres, columns.radius, longest, columns.margin)
+        if a == gx and b == gy:
+            return free, False
+        return ((a - x) / dt, (b - y) / dt, (gz - z) / dt), True
+    bent, near = avoidance.column_velocity((x, y), (gx, gy), columns.centres, columns.field, columns.xi)
+    return (shorten((bent[0], bent[1], free[2]), columns.speed), True) if near else (free, False)
 
 
-def _keep_off(wanted: Vec, trajectory: Trajectory, around: Surroundings, settings: SteeringSettings) -> Vec:
-    """Returns the velocity (n, 3) to add to stay away from every drone, from the hand and from the columns.
+def _keep_off(
+    wanted: Planar, trajectory: Trajectory, around: Surroundings, settings: SteeringSettings
+) -> Planar:
+    """Returns the velocity to add to stay away from every drone, from the hand and from the columns.
 
     Each only adds what the others left missing; further rounds settle between those that disagree. Columns,
     which never give way, have the last word.
     """
-    point, moving = trajectory.point[:, :2], trajectory.velocity[:, :2]
-    body, flying = around.position[:, :2], around.velocity[:, :2]
-    pressing = [avoidance.threats(body, flying, around.drones, DRONE_BUBBLE)]
-    push = avoidance.separation(point, around.drones, settings.avoidance.separation)
+    x, y, _ = trajectory.point
+    u, v = avoidance.separation(x, y, around.drones, settings.separation)
     if around.hand is not None:
-        pressing.append(avoidance.threats(point, moving, around.hand, HAND_BUBBLE))
-        pressing.append(avoidance.threats(body, flying, around.hand, HAND_BUBBLE))
-        push += avoidance.separation(point, around.hand, settings.avoidance.separation)
-    if len(settings.columns):
-        columns = avoidance.columns_near(body, flying, settings.columns, COLUMN_BUBBLE)
-        pressing.append(avoidance.threats(body, flying, columns, COLUMN_BUBBLE))
-    pressing = [each for each in pressing if len(each.row)]
-    for _ in range(ROUNDS if pressing else 0):
-        before = push.copy()
+        a, b = avoidance.separation(x, y, [around.hand], settings.separation)
+        u, v = u + a, v + b
+    pressing = _pressing(trajectory, around, settings.columns)
+    if not pressing:
+        return (u, v)
+    for _ in range(ROUNDS):
+        before_u, before_v = u, v
         for each in pressing:
-            push += avoidance.escape(wanted[:, :2] + push, each)
-        if (push == before).all():
+            a, b = avoidance.escape((wanted[0] + u, wanted[1] + v), each)
+            u, v = u + a, v + b
+        if u == before_u and v == before_v:
             break
-    planar = np.zeros_like(trajectory.point)
-    planar[:, :2] = push
-    return planar
+    return (u, v)
 
 
-def _on_goal(trajectory: Trajectory) -> Mask:
-    return norm(trajectory.point - trajectory.goal) < ON_GOAL
+def _pressing(trajectory: Trajectory, around: Surroundings, columns: Columns | None) -> list[list[Threat]]:
+    """Returns what has to be escaped from, kind by kind; mostly nothing.
+
+    The hand presses the body and the reference alike: the second must not lead the first back.
+    """
+    x, y, _ = around.position
+    u, v, _ = around.velocity
+    body, flying = (x, y), (u, v)
+    found = [avoidance.threats(body, flying, around.drones, DRONE_BUBBLE)]
+    for silent in around.silent:
+        wider = Bubble(silent.radius, DRONE_BUBBLE.lead, DRONE_BUBBLE.slip, DRONE_BUBBLE.response)
+        found.append(avoidance.threats(body, flying, [Encounter(silent.x, silent.y, 0.0, 0.0)], wider))
+    if around.hand is not None:
+        x, y, _ = trajectory.point
+        u, v, _ = trajectory.velocity
+        found.append(avoidance.threats((x, y), (u, v), [around.hand], HAND_BUBBLE))
+        found.append(avoidance.threats(body, flying, [around.hand], HAND_BUBBLE))
+    if columns is not None:
+        near = avoidance.columns_near(body, flying, columns.centres, COLUMN_BUBBLE)
+        found.append(avoidance.threats(body, flying, near, COLUMN_BUBBLE))
+    return [each for each in found if each]
 
 
-def _lead_share(escaping: Mask, hand_speed: float | Vec, settings: SteeringSettings) -> Vec:
-    """Returns how much (n, 1) of the lead is used: all under `stable`, what safety needs under `paper`."""
-    if settings.always_lead:
-        return np.ones(escaping.shape)
-    excess = (hand_speed - settings.lead_above) / (0.25 * settings.lead_above)
-    return np.where(escaping, 1.0, np.minimum(np.maximum(excess, 0.0), 1.0))
+def _lead_share(hand_speed: float, lead_above: float) -> float:
+    """Returns how much of the lead is used under `paper`: what safety needs."""
+    excess = (hand_speed - lead_above) / (0.25 * lead_above)
+    return min(max(excess, 0.0), 1.0)

@@ -1,42 +1,45 @@
 """One control step of one drone: mode, hand, links, goal, steering. State and time in, state and output out."""
 
-import math
-from collections.abc import Sequence
-
-from attrs import frozen
-from msgspec import Struct
+from typing import Final, final
 
 from agents.control import modes
+from agents.control.avoidance import Encounter
+from agents.control.goals import Guide, Row, goal_of
 from agents.control.hand import HandInput, HandSettings, MappedHand, freeze, map_hand
+from agents.control.impedance import AT_REST, LinkState, step_links
 from agents.control.modes import ModeInputs, ModeState, next_mode
-from agents.control.single.avoidance import Encounter
-from agents.control.single.goals import Guide, Row, goal_of
-from agents.control.single.impedance import AT_REST, LinkState, step_links
-from agents.control.single.repair import (
-    Kin,
-    Reference,
-    StandIn,
-    guide_of,
-    guides,
-    is_gone,
-    replace_lost,
+from agents.control.repair import Kin, Reference, StandIn, all_follow, guide_of, guides, is_gone, replace_lost
+from agents.control.steering import (
+    LONGEST_STEP,
+    Bystander,
+    Steered,
+    SteeringSettings,
+    Surroundings,
+    steer,
 )
-from agents.control.single.steering import Bystander, Steered, SteeringSettings, Surroundings, steer
-from agents.control.single.trajectory import Trajectory, start_at
-from agents.control.single.vectors import ORIGIN, Vector, norm, rotate
-from agents.control.steering import LONGEST_STEP
-from shared.messages import NO_FLAGS, Flag, Mode, Wish
+from agents.control.trajectory import Trajectory, start_at
+from agents.control.vectors import ORIGIN, Vector, distance, norm, rotate
+from shared.messages import Flag, Mode, Wish
 
-BLOCKED_ERROR = 0.3
+BLOCKED_ERROR: Final = 0.3
 """Goal error that counts as not arriving, m ..."""
-BLOCKED_TIME = 2.0
+BLOCKED_TIME: Final = 2.0
 """... after this long, s."""
 
-_JOINING_MODES = frozenset({Mode.GROUND, Mode.TAKEOFF})
-_REPAIRED_MODES = modes.GUIDED_MODES | {Mode.TAKEOFF}
+# As plain numbers: Python takes longer to combine two members of an enumeration than for all of `_flags`.
+EXTRAPOLATING: Final[int] = Flag.EXTRAPOLATING.value
+REPAIRED: Final[int] = Flag.REPAIRED.value
+BLOCKED: Final[int] = Flag.BLOCKED.value
+FENCE: Final[int] = Flag.FENCE.value
+LOW_BATTERY: Final[int] = Flag.LOW_BATTERY.value
+CRITICAL_BATTERY: Final[int] = Flag.CRITICAL_BATTERY.value
+OLD_POSE: Final[int] = Flag.OLD_POSE.value
+HAND_STALE: Final[int] = Flag.HAND_STALE.value
+REFERENCE_LOST: Final[int] = Flag.REFERENCE_LOST.value
+AVOIDING: Final[int] = Flag.AVOIDING.value
 
 
-@frozen(kw_only=True)
+@final
 class Settings:
     """Everything about one drone that does not change in flight.
 
@@ -45,25 +48,47 @@ class Settings:
         hand: How the hand is mapped.
         steering: Limits and fields.
         stable: Whether references are the neighbours' goals instead of their positions.
-        reference_heights: Rest heights of the references above the hand, m; None uses their actual ones.
         kin: Its ancestors in the reference graph, the references of its row first and in their order.
         takeoff_height: Where it joins the formation, m.
         takeoff_speed: m/s.
         landing_speed: m/s.
     """
 
-    row: Row
-    hand: HandSettings
-    steering: SteeringSettings
-    stable: bool
-    reference_heights: tuple[float, ...] | None
-    kin: tuple[Kin, ...]
-    takeoff_height: float
-    takeoff_speed: float
-    landing_speed: float
+    __slots__ = (
+        "hand",
+        "kin",
+        "landing_speed",
+        "row",
+        "stable",
+        "steering",
+        "takeoff_height",
+        "takeoff_speed",
+    )
+
+    def __init__(
+        self,
+        *,
+        row: Row,
+        hand: HandSettings,
+        steering: SteeringSettings,
+        stable: bool,
+        kin: tuple[Kin, ...],
+        takeoff_height: float,
+        takeoff_speed: float,
+        landing_speed: float,
+    ) -> None:
+        self.row: Final = row
+        self.hand: Final = hand
+        self.steering: Final = steering
+        self.stable: Final = stable
+        self.kin: Final = kin
+        self.takeoff_height: Final = takeoff_height
+        self.takeoff_speed: Final = takeoff_speed
+        self.landing_speed: Final = landing_speed
 
 
-class Inputs(Struct, frozen=True):
+@final
+class Inputs:
     """What one step works on.
 
     Attributes:
@@ -80,20 +105,50 @@ class Inputs(Struct, frozen=True):
         silent: Those of them that have fallen silent, where they may be by now.
     """
 
-    position: Vector
-    velocity: Vector
-    pose_age: float
-    battery: float
-    hand: HandInput | None
-    wish: Wish | None
-    hand_age: float
-    hand_fresh: bool
-    references: tuple[Reference | None, ...]
-    drones: Sequence[Encounter]
-    silent: Sequence[Bystander] = ()
+    __slots__ = (
+        "battery",
+        "drones",
+        "hand",
+        "hand_age",
+        "hand_fresh",
+        "pose_age",
+        "position",
+        "references",
+        "silent",
+        "velocity",
+        "wish",
+    )
+
+    def __init__(
+        self,
+        *,
+        position: Vector,
+        velocity: Vector,
+        pose_age: float,
+        battery: float,
+        hand: HandInput | None,
+        wish: Wish | None,
+        hand_age: float,
+        hand_fresh: bool,
+        references: list[Reference | None],
+        drones: list[Encounter],
+        silent: list[Bystander],
+    ) -> None:
+        self.position: Final = position
+        self.velocity: Final = velocity
+        self.pose_age: Final = pose_age
+        self.battery: Final = battery
+        self.hand: Final = hand
+        self.wish: Final = wish
+        self.hand_age: Final = hand_age
+        self.hand_fresh: Final = hand_fresh
+        self.references: Final = references
+        self.drones: Final = drones
+        self.silent: Final = silent
 
 
-class State(Struct, frozen=True):
+@final
+class State:
     """What one step hands to the next.
 
     Attributes:
@@ -106,22 +161,45 @@ class State(Struct, frozen=True):
         stand_ins: How far each of the kin has been replaced; none while all speak for themselves.
     """
 
-    mode: ModeState
-    hand: MappedHand | None
-    links: tuple[LinkState, ...]
-    trajectory: Trajectory
-    anchor: Vector
-    blocked_for: float
-    stand_ins: tuple[StandIn, ...]
+    __slots__ = ("anchor", "blocked_for", "hand", "links", "mode", "stand_ins", "trajectory")
+
+    def __init__(
+        self,
+        mode: ModeState,
+        hand: MappedHand | None,
+        links: tuple[LinkState, ...],
+        trajectory: Trajectory,
+        anchor: Vector,
+        blocked_for: float,
+        stand_ins: tuple[StandIn, ...],
+    ) -> None:
+        self.mode: Final = mode
+        self.hand: Final = hand
+        self.links: Final = links
+        self.trajectory: Final = trajectory
+        self.anchor: Final = anchor
+        self.blocked_for: Final = blocked_for
+        self.stand_ins: Final = stand_ins
 
 
-class Output(Struct, frozen=True):
-    """Result of one step: vectors in the world frame, m and m/s, and the conditions."""
+@final
+class Output:
+    """Result of one step.
 
-    goal: Vector
-    goal_velocity: Vector
-    setpoint: Vector
-    flags: Flag
+    Attributes:
+        goal: m.
+        goal_velocity: m/s.
+        setpoint: m.
+        flags: Conditions, bits of `Flag`.
+    """
+
+    __slots__ = ("flags", "goal", "goal_velocity", "setpoint")
+
+    def __init__(self, goal: Vector, goal_velocity: Vector, setpoint: Vector, flags: int) -> None:
+        self.goal: Final = goal
+        self.goal_velocity: Final = goal_velocity
+        self.setpoint: Final = setpoint
+        self.flags: Final = flags
 
 
 def start(position: Vector, settings: Settings, *, airborne: bool) -> State:
@@ -158,32 +236,37 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
     velocity = ORIGIN if hand is None else rotate(hand.velocity, -hand.yaw)
     links = step_links(state.links, settings.row.links, velocity, dt)
 
-    if mode in modes.GUIDED_MODES and lead is not None and hand is not None:
-        goal, goal_velocity = goal_of(settings.row, links, hand, lead, settings.reference_heights)
+    if modes.is_guided(mode) and lead is not None and hand is not None:
+        goal, goal_velocity = goal_of(settings.row, links, hand, lead)
         anchor = state.trajectory.point
     else:
         anchor = goal = _own_goal(state, mode, inputs.position, settings, min(dt, LONGEST_STEP))
         goal_velocity = ORIGIN
 
-    trajectory = state.trajectory if mode in modes.AIRBORNE_MODES else start_at(inputs.position)
+    trajectory = state.trajectory if modes.is_airborne(mode) else start_at(inputs.position)
     steered = steer(trajectory, goal, goal_velocity, _surroundings(inputs), settings.steering, dt)
-    late = mode is modes.FOLLOW and math.dist(goal, inputs.position) > BLOCKED_ERROR
+    late = mode is modes.FOLLOW and distance(goal, inputs.position) > BLOCKED_ERROR
     blocked_for = state.blocked_for + dt if late else 0.0
-    flags = _flags(inputs, steered, inputs.references[:direct], stand_ins[:direct], usable=lead is not None)
+    flags = _flags(inputs, steered, stand_ins, direct, usable=lead is not None)
     if blocked_for > BLOCKED_TIME:
-        flags |= Flag.BLOCKED
+        flags |= BLOCKED
     after = State(mode_state, hand, links, steered.trajectory, anchor, blocked_for, stand_ins)
     return after, Output(goal, goal_velocity, steered.setpoint, flags)
 
 
 def _stand_ins(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[StandIn, ...]:
     """Replaces who is gone while there is a formation; on the ground everybody is expected to join."""
-    if state.mode.mode not in _REPAIRED_MODES:
+    mode = state.mode.mode
+    if not (modes.is_guided(mode) or mode is modes.TAKEOFF):
         return ()
-    if not state.stand_ins and not any(map(is_gone, inputs.references)):
+    if not state.stand_ins and not _any_gone(inputs.references):
         return ()
     velocity = ORIGIN if state.hand is None else rotate(state.hand.velocity, -state.hand.yaw)
     return replace_lost(state.stand_ins, settings.kin, inputs.references, velocity, dt)
+
+
+def _any_gone(references: list[Reference | None]) -> bool:
+    return any(is_gone(reference) for reference in references)
 
 
 def _lead(
@@ -194,8 +277,8 @@ def _lead(
         found = guides(stand_ins, settings.kin, inputs.references, direct, hand)
     else:
         # Without a hand there is no goal; all that counts is whether the references hold or follow.
-        found = [guide_of(reference) for reference in inputs.references[:direct]]
-    lead = []
+        found = [guide_of(inputs.references[place]) for place in range(direct)]
+    lead: list[Guide] = []
     for guide in found:
         if guide is None:
             return None
@@ -206,13 +289,13 @@ def _lead(
 def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Guide] | None) -> ModeInputs:
     lost = inputs.pose_age > modes.POSE_LOST
     return ModeInputs(
-        wish=inputs.wish,
-        hand_age=inputs.hand_age,
-        pose_age=inputs.pose_age,
-        battery=inputs.battery,
-        height=state.anchor[2] if lost else inputs.position[2],
-        takeoff_height=settings.takeoff_height,
-        references_follow=lead is not None and all(guide.mode is modes.FOLLOW for guide in lead),
+        inputs.wish,
+        inputs.hand_age,
+        inputs.pose_age,
+        inputs.battery,
+        state.anchor[2] if lost else inputs.position[2],
+        settings.takeoff_height,
+        references_follow=lead is not None and all_follow(lead),
     )
 
 
@@ -222,7 +305,8 @@ def _hand(state: State, inputs: Inputs, mode: Mode, settings: HandSettings) -> M
     Only a hand that wants to FLY is adopted: what a relay sends while it holds need not be where a hand is.
     """
     mapped, sample = state.hand, inputs.hand
-    if (mapped is None or mode in _JOINING_MODES) and sample is not None and inputs.wish is Wish.FLY:
+    joining = mode is modes.GROUND or mode is modes.TAKEOFF
+    if (mapped is None or joining) and sample is not None and inputs.wish is modes.FLY_WISH:
         adopted = map_hand(None, sample, settings)
         return adopted if mode is modes.FOLLOW else freeze(adopted)
     if mapped is None:
@@ -235,53 +319,48 @@ def _hand(state: State, inputs: Inputs, mode: Mode, settings: HandSettings) -> M
 def _own_goal(state: State, mode: Mode, position: Vector, settings: Settings, dt: float) -> Vector:
     """Returns the goal of a drone on its own: climbing, descending, holding, or standing on the ground."""
     x, y, z = state.anchor
-    if mode is Mode.TAKEOFF:
+    if mode is modes.TAKEOFF:
         return (x, y, max(z, min(z + settings.takeoff_speed * dt, settings.takeoff_height)))
-    if mode is Mode.LAND:
+    if mode is modes.LAND:
         return (x, y, max(z - settings.landing_speed * dt, 0.0))
-    if mode is Mode.HOLD:
+    if mode is modes.HOLD:
         return state.anchor
     return position
 
 
 def _surroundings(inputs: Inputs) -> Surroundings:
     """Returns who is around; a silent hand stays where it was, but no longer comes closer."""
-    hand = inputs.hand
+    position, flying, hand = inputs.position, inputs.velocity, inputs.hand
     if hand is None:
-        return Surroundings(inputs.position, inputs.velocity, inputs.drones, None, 0.0, inputs.silent)
+        return Surroundings(position, flying, inputs.drones, inputs.silent, None, 0.0)
+    velocity = hand.velocity if inputs.hand_age <= modes.HAND_STALE else ORIGIN
     x, y, _ = hand.position
-    u, v, _ = velocity = hand.velocity if inputs.hand_age <= modes.HAND_STALE else ORIGIN
-    return Surroundings(
-        inputs.position, inputs.velocity, inputs.drones, (x, y, u, v), norm(velocity), inputs.silent
-    )
+    u, v, _ = velocity
+    return Surroundings(position, flying, inputs.drones, inputs.silent, Encounter(x, y, u, v), norm(velocity))
 
 
 def _flags(
-    inputs: Inputs,
-    steered: Steered,
-    references: Sequence[Reference | None],
-    stand_ins: Sequence[StandIn],
-    *,
-    usable: bool,
-) -> Flag:
-    flags = NO_FLAGS
-    for reference in references:
+    inputs: Inputs, steered: Steered, stand_ins: tuple[StandIn, ...], direct: int, *, usable: bool
+) -> int:
+    flags = 0
+    for place in range(direct):
+        reference = inputs.references[place]
         if reference is not None and not reference.fresh:
-            flags |= Flag.EXTRAPOLATING
-    if stand_ins and any(stand_in.share for stand_in in stand_ins):
-        flags |= Flag.REPAIRED
+            flags |= EXTRAPOLATING
+        if stand_ins and stand_ins[place].share > 0.0:
+            flags |= REPAIRED
     if not usable:
-        flags |= Flag.REFERENCE_LOST
+        flags |= REFERENCE_LOST
     if inputs.hand_age > modes.HAND_STALE:
-        flags |= Flag.HAND_STALE
+        flags |= HAND_STALE
     if inputs.pose_age > modes.POSE_FRESH:
-        flags |= Flag.OLD_POSE
+        flags |= OLD_POSE
     if inputs.battery <= modes.LOW_BATTERY:
-        flags |= Flag.LOW_BATTERY
+        flags |= LOW_BATTERY
     if inputs.battery <= modes.CRITICAL_BATTERY:
-        flags |= Flag.CRITICAL_BATTERY
+        flags |= CRITICAL_BATTERY
     if steered.fenced:
-        flags |= Flag.FENCE
+        flags |= FENCE
     if steered.avoiding:
-        flags |= Flag.AVOIDING
+        flags |= AVOIDING
     return flags

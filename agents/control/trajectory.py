@@ -4,84 +4,88 @@ The vehicle's set-point leads it: `setpoint = reference + tau * lead velocity`. 
 and the lead velocity, so the vehicle is never asked for more acceleration than the limit.
 """
 
-import numpy as np
-from attrs import field, frozen
+import math
+from typing import Final, final
 
-from shared.formation import Vec
+from agents.control.vectors import ORIGIN, Vector, norm, shorten
 
-BRAKING_SHARE = 0.8
+BRAKING_SHARE: Final = 0.8
 """Share of the acceleration limit used to plan braking; the rest is for following a moving goal."""
 
 
-@frozen(kw_only=True)
+@final
 class Trajectory:
-    """Reference of n drones.
+    """Reference of one drone.
 
     Attributes:
-        point: (n, 3) m.
-        velocity: (n, 3) m/s.
-        lead: (n, 3) velocity that the set-point leads by, m/s.
-        goal: (n, 3) goal of the last step, m.
+        point: m.
+        velocity: m/s.
+        lead: Velocity that the set-point leads by, m/s.
+        goal: Goal of the last step, m.
     """
 
-    point: Vec = field(eq=False)
-    velocity: Vec = field(eq=False)
-    lead: Vec = field(eq=False)
-    goal: Vec = field(eq=False)
+    __slots__ = ("goal", "lead", "point", "velocity")
+
+    def __init__(self, point: Vector, velocity: Vector, lead: Vector, goal: Vector) -> None:
+        self.point: Final = point
+        self.velocity: Final = velocity
+        self.lead: Final = lead
+        self.goal: Final = goal
 
 
-def start_at(points: Vec) -> Trajectory:
-    """Returns a trajectory at rest at points (n, 3)."""
-    zero = np.zeros_like(points)
-    return Trajectory(point=points, velocity=zero, lead=zero, goal=points)
+def start_at(point: Vector) -> Trajectory:
+    """Returns a trajectory at rest."""
+    return Trajectory(point, ORIGIN, ORIGIN, point)
 
 
-def tracking_velocity(trajectory: Trajectory, goal: Vec, dt: float, acceleration: float) -> Vec:
-    """Returns the velocity (n, 3) that reaches the goal at once, or closes in on it without overshoot.
+def tracking_velocity(trajectory: Trajectory, goal: Vector, dt: float, acceleration: float) -> Vector:
+    """Returns the velocity that reaches the goal at once, or closes in on it without overshoot.
 
     In the frame of the moving goal the distance is closed at most as fast as it can be braked away; what
     the finite step adds is 0.6 acceleration dt^2, half a millimetre at 60 Hz.
 
     Args:
         trajectory: Reference before the step.
-        goal: (n, 3) goal of this step, m.
+        goal: Goal of this step, m.
         dt: Step, s.
         acceleration: Limit, m/s^2.
     """
-    goal_velocity = (goal - trajectory.goal) / dt
-    error = trajectory.goal - trajectory.point
-    distance = norm(error)
-    closing = np.minimum(distance / dt, np.sqrt(2.0 * BRAKING_SHARE * acceleration * distance))
-    return goal_velocity + error * (closing / np.maximum(distance, 1e-12))
+    px, py, pz = trajectory.point
+    x, y, z = trajectory.goal
+    gx, gy, gz = goal
+    ex, ey, ez = x - px, y - py, z - pz
+    way = norm((ex, ey, ez))
+    if way == 0.0:
+        return ((gx - x) / dt, (gy - y) / dt, (gz - z) / dt)
+    closing = min(way / dt, math.sqrt(2.0 * BRAKING_SHARE * acceleration * way))
+    share = closing / max(way, 1e-12)
+    return ((gx - x) / dt + ex * share, (gy - y) / dt + ey * share, (gz - z) / dt + ez * share)
 
 
 def advance(
-    trajectory: Trajectory, goal: Vec, wanted: Vec, dt: float, speed: float | Vec, acceleration: float | Vec
-) -> Trajectory:
+    trajectory: Trajectory, wanted: Vector, dt: float, speed: float, acceleration: float
+) -> tuple[Vector, Vector]:
     """Moves the reference with the wanted velocity as far as the limits allow.
 
     Args:
         trajectory: Reference before the step.
-        goal: (n, 3) goal of this step, m.
-        wanted: (n, 3) wanted velocity, m/s.
+        wanted: Wanted velocity, m/s.
         dt: Step, s.
         speed: Limit, m/s.
         acceleration: Limit, m/s^2.
+
+    Returns:
+        Its point and velocity after the step.
     """
-    change = limit(limit(wanted, speed) - trajectory.velocity, acceleration * dt)
-    velocity = trajectory.velocity + change
-    return Trajectory(
-        point=trajectory.point + velocity * dt, velocity=velocity, lead=trajectory.lead, goal=goal
-    )
+    velocity = approach(trajectory.velocity, shorten(wanted, speed), acceleration * dt)
+    x, y, z = trajectory.point
+    u, v, w = velocity
+    return (x + u * dt, y + v * dt, z + w * dt), velocity
 
 
-def limit(vectors: Vec, largest: float | Vec) -> Vec:
-    """Shortens vectors (n, 3) to at most `largest`."""
-    length = norm(vectors)
-    return vectors * np.minimum(1.0, largest / np.maximum(length, 1e-12))
-
-
-def norm(vectors: Vec) -> Vec:
-    """Returns the lengths (n, 1) of vectors (n, 3)."""
-    lengths: Vec = np.sqrt(np.vecdot(vectors, vectors))
-    return lengths[:, None]
+def approach(velocity: Vector, wanted: Vector, largest: float) -> Vector:
+    """Changes a velocity towards a wanted one by at most `largest`, m/s."""
+    u, v, w = velocity
+    a, b, c = wanted
+    du, dv, dw = shorten((a - u, b - v, c - w), largest)
+    return (u + du, v + dv, w + dw)

@@ -1,6 +1,6 @@
 """`bench lockstep`: how much faster than real time the simulators are, in one process on one core.
 
-Small swarms run as real agents, large ones as one batch of arrays.
+Small swarms run as real agents, large ones as one flock without messages.
 """
 
 import itertools
@@ -11,17 +11,17 @@ from typing import Any
 from agents.settings import hand_settings
 from deploy.bench.figures import spread
 from deploy.bench.report import INK, Json, Report, Sheet
-from deploy.lockstep.batched import Batch, hands_at
-from deploy.lockstep.hand_track import relayed, track_hand
+from deploy.lockstep.central import Flock
+from deploy.lockstep.hand_track import map_samples, relayed
 from deploy.lockstep.lockstep import Lockstep
-from deploy.lockstep.start import rest_places, start_fleet
+from deploy.lockstep.start import rest_places, start_flyers
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
 from shared.messages import HandSample
 from shared.scenario import Scenario
 
 LARGEST_OF_AGENTS = 32
-"""Larger swarms run batched."""
+"""Larger swarms run as one flock."""
 WARM_UP = 10
 """Ticks that do not count."""
 FEWEST = 5
@@ -54,10 +54,10 @@ def measure(
     for number in drones:
         settings = load_scenario(scenario, (f"formation.n={number}", *overrides))
         formation = build_formation(settings, scenario)
-        kind = "agents" if number <= LARGEST_OF_AGENTS else "batch"
+        kind = "agents" if number <= LARGEST_OF_AGENTS else "flock"
         say(f"{number} drones, {kind}")
         samples = relayed("scripted:tour?lead=1", LONGEST_S, settings.rates.control_hz)
-        run = _agents if kind == "agents" else _batch
+        run = _agents if kind == "agents" else _flock
         times = _timed(run(settings, formation, samples), seconds)
         records.append(_record(number, kind, times, settings.rates.control_hz))
     return Report(
@@ -68,20 +68,24 @@ def measure(
     )
 
 
-def _agents(settings: Scenario, formation: Formation, samples: Sequence[HandSample]) -> Iterator[object]:
-    hand = track_hand(samples[:1], hand_settings(settings, formation))
-    fleet = start_fleet(settings, formation, rest_places(formation, hand), airborne=True)
-    swarm = Lockstep(settings, formation, fleet, encoded=False)
-    return (swarm.advance(sample) for sample in samples)
+def _agents(settings: Scenario, formation: Formation, samples: Sequence[HandSample]) -> Iterator[None]:
+    ((_, hand),) = map_samples(samples[:1], hand_settings(settings, formation))
+    flyers = start_flyers(settings, formation, rest_places(formation, hand), airborne=True)
+    swarm = Lockstep(settings, formation, flyers, encoded=False)
+    for sample in samples:
+        swarm.advance(sample)
+        yield
 
 
-def _batch(settings: Scenario, formation: Formation, samples: Sequence[HandSample]) -> Iterator[object]:
-    hand = track_hand(samples, hand_settings(settings, formation))
-    batch = Batch(settings, formation, rest_places(formation, hand)[None])
-    return (batch.advance(hands_at([hand], tick)) for tick in range(len(samples)))
+def _flock(settings: Scenario, formation: Formation, samples: Sequence[HandSample]) -> Iterator[None]:
+    hands = map_samples(samples, hand_settings(settings, formation))
+    flock = Flock(settings, formation, rest_places(formation, hands[0][1]))
+    for sample, hand in hands:
+        flock.advance(sample, hand)
+        yield
 
 
-def _timed(ticks: Iterator[object], seconds: float) -> list[float]:
+def _timed(ticks: Iterator[None], seconds: float) -> list[float]:
     """Returns how long each tick took, s, until the time or the hand is over."""
     for _ in itertools.islice(ticks, WARM_UP):
         pass
@@ -129,7 +133,7 @@ def _sheet(records: Sequence[Json]) -> Sheet:
 
 def _draw(figure: Any, records: Sequence[Json]) -> None:
     axes = figure.subplots()
-    for kind, marker in (("agents", "o"), ("batch", "s")):
+    for kind, marker in (("agents", "o"), ("flock", "s")):
         of_kind = [r for r in records if r["kind"] == kind]
         axes.plot(
             [r["drones"] for r in of_kind], [r["realtime_factor"] for r in of_kind], marker=marker, label=kind

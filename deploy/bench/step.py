@@ -9,8 +9,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from agents.agent import Agent
 from agents.settings import agent_settings
 from agents.vehicles.base import Pose
@@ -18,12 +16,12 @@ from deploy.bench.figures import TEXT_COLUMNS, spread
 from deploy.bench.report import Report, Sheet
 from deploy.lockstep.hand_track import relayed
 from deploy.lockstep.lockstep import Lockstep
-from deploy.lockstep.start import start_fleet
+from deploy.lockstep.start import start_flyers
 from deploy.lockstep.ticks import tick_ns
 from shared.codec import encode
 from shared.config import load_scenario
-from shared.formation import Formation, Vec, build_formation
-from shared.messages import DroneState
+from shared.formation import Formation, build_formation
+from shared.messages import DroneState, Vector
 from shared.scenario import Scenario
 from shared.transport import Arrival
 
@@ -86,7 +84,7 @@ def flight_of(scenario: Scenario, formation: Formation, drone: int, ticks: int) 
     """Flies in lockstep and yields what one drone meets in each tick."""
     rate = scenario.rates.control_hz
     samples = relayed("scripted:tour?lead=1", ticks / rate, rate)[:ticks]
-    swarm = Lockstep(scenario, formation, start_fleet(scenario, formation, _places(formation), airborne=True))
+    swarm = Lockstep(scenario, formation, start_flyers(scenario, formation, _places(formation), airborne=True))
     row = formation.row(drone)
     own = set(
         Agent(scenario, formation, drone, agent_settings(scenario, formation, drone), epoch=0).senses.keys
@@ -98,9 +96,8 @@ def flight_of(scenario: Scenario, formation: Formation, drone: int, ticks: int) 
         yield now, arrived, _pose(states[row], tick)
 
 
-def _places(formation: Formation) -> Vec:
-    places: Vec = formation.rest + np.array([0.0, 0.0, HEIGHT])
-    return places
+def _places(formation: Formation) -> list[Vector]:
+    return [(x, y, z + HEIGHT) for x, y, z in formation.rest.tolist()]
 
 
 def _pose(state: DroneState, tick: int) -> Pose:

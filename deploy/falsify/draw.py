@@ -101,12 +101,9 @@ def draw_case(plan: Plan, rng: Rng) -> Case:
 @functools.lru_cache(maxsize=64)
 def hand_room(scenario: str, overrides: tuple[str, ...]) -> Room:
     """Returns where the hand can be so that the mapped hand can be anywhere in its box, and a little beyond."""
-    settings = hand_settings(*prepare(scenario, overrides))
-    low, high = list(settings.low), list(settings.high)
-    hand = settings.hand
-    if hand.mapping == "relative":
-        low = [(v - c) / hand.gain for v, c in zip(low, hand.offset, strict=True)]
-        high = [(v - c) / hand.gain for v, c in zip(high, hand.offset, strict=True)]
+    hand = hand_settings(*prepare(scenario, overrides))
+    low = [(v - c) / hand.gain for v, c in zip(hand.low, hand.offset, strict=True)]
+    high = [(v - c) / hand.gain for v, c in zip(hand.high, hand.offset, strict=True)]
     lowest, highest = HAND_HEIGHTS
     return Room(
         low=(low[0] - BEYOND, low[1] - BEYOND, lowest), high=(high[0] + BEYOND, high[1] + BEYOND, highest)

@@ -4,20 +4,19 @@ from functools import lru_cache
 
 import numpy as np
 from attrs import field, frozen
-from msgspec.structs import replace
 
 from agents.agent import Agent, hand_input
 from agents.control.hand import map_hand
-from agents.control.modes import CRITICAL_BATTERY, GUIDED_MODES, POSE_LOST
+from agents.control.modes import CRITICAL_BATTERY, POSE_LOST, is_guided
 from agents.settings import agent_settings, hand_settings
 from agents.vehicles.base import Pose
-from agents.vehicles.bodies.link_loss import apply_link_loss
-from agents.vehicles.bodies.single.fleet import advance_flyer, flyers, pose_of
-from agents.vehicles.bodies.state import Command
+from agents.vehicles.bodies.fleet import advance, hold, pose_of
+from agents.vehicles.bodies.link_loss import obeyed
+from agents.vehicles.bodies.state import CUT, DESCEND, FLY, IDLE
 from deploy.falsify.air import Air
 from deploy.falsify.case import Case, FaultKind
 from deploy.falsify.hand import poses, samples
-from deploy.lockstep.start import start_fleet
+from deploy.lockstep.start import rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.clock import NS_PER_S
 from shared.config import vehicle_settings
@@ -84,12 +83,12 @@ def fly(case: Case) -> Flown:
     )
 
 
-def _start(case: Case, scenario: Scenario, formation: Formation, first: HandSample) -> Vec:
-    """Returns where the bodies begin (N, 3), m: about the mapped hand, or below the rest formation at home."""
-    if not case.airborne:
-        return formation.rest * (1.0, 1.0, 0.0) + (*scenario.hand.home, 0.0)
-    mapped = map_hand(None, hand_input(first), hand_settings(scenario, formation))
-    return formation.rest + mapped.point
+def _start(case: Case, scenario: Scenario, formation: Formation, first: HandSample) -> list[Vector]:
+    """Returns where the bodies begin, m: about the mapped hand, or below the rest formation at home."""
+    if case.airborne:
+        return rest_places(formation, map_hand(None, hand_input(first), hand_settings(scenario, formation)))
+    home_x, home_y = scenario.hand.home
+    return [(home_x + x, home_y + y, 0.0) for x, y, _ in formation.rest.tolist()]
 
 
 Row = tuple[list[Vector], list[bool], list[bool], list[bool]]
@@ -102,23 +101,21 @@ class Swarm:
         case: What happens to them.
         scenario: Its scenario.
         formation: Its formation.
-        places: (N, 3) where they begin, m.
+        places: Where they begin, m.
     """
 
-    def __init__(self, case: Case, scenario: Scenario, formation: Formation, places: Vec) -> None:
+    def __init__(self, case: Case, scenario: Scenario, formation: Formation, places: list[Vector]) -> None:
         self._case, self._scenario, self._formation = case, scenario, formation
         self._rate = scenario.rates.control_hz
         self._order = [row for level in formation.levels for row in level]
-        self._flyers = flyers(start_fleet(scenario, formation, places, airborne=case.airborne))
+        self._flyers = start_flyers(scenario, formation, places, airborne=case.airborne)
         listens = {drone: neighbours(scenario, formation, drone) for drone in formation.ids}
         self._air = Air(case, formation.ids, listens, self._rate)
         self._agents: list[Agent | None] = [self._agent(drone, 0) for drone in formation.ids]
-        self._told: list[tuple[int, Vector, int]] = [(Command.CUT.value, (0.0, 0.0, 0.0), 0)] * len(
-            formation.ids
-        )
+        self._told: list[tuple[int, Vector, int]] = [(CUT, (0.0, 0.0, 0.0), 0)] * len(formation.ids)
         self._poses: dict[int, tuple[Pose, int]] = {}
         self._modes = [Mode.GROUND] * len(formation.ids)
-        self._hovers = np.array([vehicle_settings(scenario, d).link_loss == "hover" for d in formation.ids])
+        self._hovers = [vehicle_settings(scenario, d).link_loss == "hover" for d in formation.ids]
         self._tick = 0
 
     def advance(self, sample: HandSample) -> Row:
@@ -166,7 +163,7 @@ class Swarm:
                 self._agents[row] = self._agent(drone, now_ns)
         held = on.get("held", set())
         self._flyers = [
-            flyer if flyer.held == (row in held) else replace(flyer, held=row in held)
+            flyer if flyer.held == (row in held) else hold(flyer, held=row in held)
             for row, flyer in enumerate(self._flyers)
         ]
 
@@ -178,7 +175,7 @@ class Swarm:
             [flyer.body.position for flyer in self._flyers],
             able,
             [able[row] and _hears_hand(self._agents[row], now_ns) for row in rows],
-            [able[row] and self._modes[row] in GUIDED_MODES for row in rows],
+            [able[row] and is_guided(self._modes[row]) for row in rows],
         )
 
     def _step(self, agent: Agent, row: int, on: dict[FaultKind, set[int]], now_ns: int) -> DroneState:
@@ -190,14 +187,9 @@ class Swarm:
 
     def _move(self, now_ns: int) -> None:
         duration = tick_length(self._tick, self._rate)
-        kinds = [kind for kind, _, _ in self._told]
-        if None in self._agents:
-            ages = np.array([(now_ns - told) / NS_PER_S for _, _, told in self._told])
-            kinds = apply_link_loss(np.array(kinds, dtype=np.int8), ages, self._hovers).tolist()
-        self._flyers = [
-            advance_flyer(flyer, kind, setpoint, duration)
-            for flyer, kind, (_, setpoint, _) in zip(self._flyers, kinds, self._told, strict=True)
-        ]
+        for row, (kind, setpoint, told_ns) in enumerate(self._told):
+            kind_now = obeyed(kind, (now_ns - told_ns) / NS_PER_S, hovers=self._hovers[row])
+            self._flyers[row] = advance(self._flyers[row], kind_now, setpoint, duration)
 
 
 _HAND_LATELY = 0.25
@@ -212,7 +204,7 @@ def _hears_hand(agent: Agent | None, now_ns: int) -> bool:
 def _command_of(state: DroneState) -> int:
     """Returns what a vehicle is told by a step, see `agents.loop.command`."""
     if state.mode is Mode.STOP:
-        return Command.CUT.value
+        return CUT
     if state.mode is Mode.GROUND:
-        return Command.IDLE.value
-    return Command.DESCEND.value if state.pose_age > POSE_LOST else Command.FLY.value
+        return IDLE
+    return DESCEND if state.pose_age > POSE_LOST else FLY

@@ -1,14 +1,14 @@
 """The hand per tick: a source's poses through the relay's own core, and what the formation makes of them."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import closing
 
 import numpy as np
 from attrs import field, frozen
 
 from agents.agent import hand_input
-from agents.control.hand import HandSettings, map_hand
+from agents.control.hand import HandInput, HandSettings, MappedHand, map_hand
 from deploy.lockstep.ticks import tick_ns
 from human_relay.relay import RelayState, make_sample
 from human_relay.sources import open_source
@@ -63,23 +63,29 @@ def relayed(uri: str, seconds: float, rate_hz: float) -> list[HandSample]:
     return samples
 
 
-def track_hand(samples: Iterable[HandSample], settings: HandSettings) -> HandTrack:
+def map_samples(samples: Iterable[HandSample], settings: HandSettings) -> list[tuple[HandInput, MappedHand]]:
     """Maps every sample of a flying hand.
 
     Args:
         samples: One per tick, at least one.
         settings: Mapping and clamps of the scenario.
     """
-    inputs = [hand_input(sample) for sample in samples]
-    mapped = [map_hand(None, inputs[0], settings)]
-    for later in inputs[1:]:
-        mapped.append(map_hand(mapped[-1], later, settings))
+    mapped: list[tuple[HandInput, MappedHand]] = []
+    before: MappedHand | None = None
+    for sample in map(hand_input, samples):
+        before = map_hand(before, sample, settings)
+        mapped.append((sample, before))
+    return mapped
+
+
+def track_of(hands: Sequence[tuple[HandInput, MappedHand]]) -> HandTrack:
+    """Returns samples and what was made of them as arrays."""
     return HandTrack(
-        t=np.array([each.stamp for each in inputs]),
-        position=np.array([each.position for each in inputs]),
-        velocity=np.array([each.velocity for each in inputs]),
-        point=np.array([each.point for each in mapped]),
-        point_velocity=np.array([each.velocity for each in mapped]),
-        yaw=np.array([each.yaw for each in mapped]),
-        yaw_rate=np.array([each.yaw_rate for each in mapped]),
+        t=np.array([sample.stamp for sample, _ in hands]),
+        position=np.array([sample.position for sample, _ in hands]),
+        velocity=np.array([sample.velocity for sample, _ in hands]),
+        point=np.array([mapped.point for _, mapped in hands]),
+        point_velocity=np.array([mapped.velocity for _, mapped in hands]),
+        yaw=np.array([mapped.yaw for _, mapped in hands]),
+        yaw_rate=np.array([mapped.yaw_rate for _, mapped in hands]),
     )

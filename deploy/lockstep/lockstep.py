@@ -12,24 +12,22 @@ import numpy as np
 
 from agents.agent import Agent
 from agents.settings import agent_settings, hand_settings
-from agents.vehicles.bodies.fleet import Fleet
-from agents.vehicles.bodies.single.fleet import advance_flyer, flyers, pose_of
-from agents.vehicles.bodies.state import Command
-from deploy.lockstep.hand_track import track_hand
+from agents.vehicles.bodies.fleet import Flyer, advance, pose_of
+from agents.vehicles.bodies.state import CUT, FLY, IDLE
+from deploy.lockstep.hand_track import map_samples, track_of
 from deploy.lockstep.record import Moment, Record, make_record
-from deploy.lockstep.start import rest_places, start_fleet
+from deploy.lockstep.start import rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.codec import encode
-from shared.formation import Formation, Vec
-from shared.messages import DroneState, HandSample, Mode
+from shared.formation import Formation
+from shared.messages import DroneState, HandSample, Mode, Vector
 from shared.scenario import Scenario
 from shared.senses import Sensed
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
 _HAND_KEY = HAND.key()
-_COMMANDS = dict.fromkeys(Mode, Command.FLY.value)
-_COMMANDS |= {Mode.STOP: Command.CUT.value, Mode.GROUND: Command.IDLE.value}
+_COMMANDS = dict.fromkeys(Mode, FLY) | {Mode.STOP: CUT, Mode.GROUND: IDLE}
 
 
 class Lockstep:
@@ -38,7 +36,7 @@ class Lockstep:
     Args:
         scenario: The scenario.
         formation: Its formation.
-        fleet: Bodies at the start, one per drone in the formation's order.
+        flyers: Bodies at the start, one per drone in the formation's order.
         encoded: Whether agents hear bytes, as in flight; it takes longer.
 
     Attributes:
@@ -48,8 +46,10 @@ class Lockstep:
         payloads: If encoded: what was published in the last tick, by key: the hand's sample and every state.
     """
 
-    def __init__(self, scenario: Scenario, formation: Formation, fleet: Fleet, *, encoded: bool = True) -> None:
-        self.flyers = flyers(fleet)
+    def __init__(
+        self, scenario: Scenario, formation: Formation, flyers: Sequence[Flyer], *, encoded: bool = True
+    ) -> None:
+        self.flyers = list(flyers)
         self.tick = 0
         self.followed: set[int] = set()
         self.payloads: dict[str, bytes] = {}
@@ -85,7 +85,7 @@ class Lockstep:
         self.followed.update(state.id for state in ordered if state.mode is Mode.FOLLOW)
         duration = tick_length(self.tick, self._rate)
         self.flyers = [
-            advance_flyer(self.flyers[row], _COMMANDS[state.mode], state.setpoint, duration)
+            advance(self.flyers[row], _COMMANDS[state.mode], state.setpoint, duration)
             for row, state in enumerate(ordered)
         ]
         self.tick += 1
@@ -113,7 +113,7 @@ def fly_lockstep(
     *,
     airborne: bool = True,
     held: AbstractSet[int] = frozenset(),
-    places: Vec | None = None,
+    places: Sequence[Vector] | None = None,
     encoded: bool = False,
 ) -> Record:
     """Flies a whole hand.
@@ -124,19 +124,19 @@ def fly_lockstep(
         samples: One per tick, at least one.
         airborne: Start hovering in the rest formation; else on the ground below it.
         held: Drones that a hand holds in place.
-        places: (N, 3) where to start instead, m.
+        places: Where to start instead, in the formation's order, m.
         encoded: See `Lockstep`.
 
     Returns:
         The run.
     """
-    hand = track_hand(samples, hand_settings(scenario, formation))
-    rows = {1 + formation.row(drone) for drone in held}
-    start = rest_places(formation, hand) if places is None else places
-    fleet = start_fleet(scenario, formation, start, airborne=airborne, held=rows)
-    swarm = Lockstep(scenario, formation, fleet, encoded=encoded)
+    hands = map_samples(samples, hand_settings(scenario, formation))
+    rows = {formation.row(drone) for drone in held}
+    start = rest_places(formation, hands[0][1]) if places is None else places
+    flyers = start_flyers(scenario, formation, start, airborne=airborne, held=rows)
+    swarm = Lockstep(scenario, formation, flyers, encoded=encoded)
     moments = [_moment(formation, swarm.advance(sample)) for sample in samples]
-    return make_record(formation, hand, moments, swarm.followed)
+    return make_record(formation, track_of(hands), moments, swarm.followed)
 
 
 def _moment(formation: Formation, states: list[DroneState]) -> Moment:

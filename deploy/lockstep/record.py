@@ -9,7 +9,7 @@ import numpy as np
 from attrs import field, frozen
 
 from agents.vehicles.bodies.state import AIRBORNE_HEIGHT
-from agents.vehicles.world.referee import Rules, report, start_referee, update
+from agents.vehicles.world.referee import RefereeState, Rules, report, update
 from deploy.lockstep.hand_track import HandTrack
 from shared.formation import Formation, Vec
 
@@ -70,10 +70,13 @@ def make_record(
 
 def judge(record: Record, rules: Rules) -> dict[str, float]:
     """Returns the referee's numbers over the whole run, see `agents.vehicles.world.referee.report`."""
-    state = start_referee(rules)
-    for t, positions, hand in zip(record.hand.t, record.position, record.hand.position, strict=True):
-        airborne = positions[:, 2] > AIRBORNE_HEIGHT
-        state = update(rules, state, positions, airborne, hand=hand, t=float(t))
+    state = RefereeState()
+    ticks = zip(
+        *(array.tolist() for array in (record.hand.t, record.position, record.hand.position)), strict=True
+    )
+    for t, positions, hand in ticks:
+        airborne = [z > AIRBORNE_HEIGHT for _, _, z in positions]
+        state = update(rules, state, positions, airborne, hand=hand, t=t)
     return report(state)
 
 

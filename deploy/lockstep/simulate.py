@@ -9,7 +9,7 @@ from attrs import frozen
 
 from agents.vehicles.world.setup import referee_rules
 from deploy.launcher.process_table import hint_overrides
-from deploy.lockstep.batched import fly_batched
+from deploy.lockstep.central import fly_central
 from deploy.lockstep.hand_track import relayed
 from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.picture import draw
@@ -67,7 +67,7 @@ def simulate(options: Options) -> dict[str, Any]:
     scenario, formation = open_scenario(options.scenario, (*hints, *law, *options.overrides), network=False)
     samples = relayed(options.hand, options.seconds, scenario.rates.control_hz)
     started = time.perf_counter()
-    fly = fly_batched if options.law == CENTRAL else fly_lockstep
+    fly = fly_central if options.law == CENTRAL else fly_lockstep
     record = fly(scenario, formation, samples)
     took_s = time.perf_counter() - started
     if options.csv:

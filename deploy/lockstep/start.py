@@ -1,42 +1,43 @@
 """Where a simulated run starts: bodies in the rest formation about the hand, or on the ground below it."""
 
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 
-import numpy as np
-
-from agents.control.goals import rotate
-from agents.vehicles.bodies.fleet import Fleet, hold, hover_fleet, park_fleet
-from deploy.lockstep.hand_track import HandTrack
+from agents.control.hand import MappedHand
+from agents.control.vectors import rotate
+from agents.vehicles.bodies.fleet import Flyer, hover, park_fleet
 from shared.config import vehicle_settings
-from shared.formation import Formation, Vec
+from shared.formation import Formation
+from shared.messages import Vector
 from shared.scenario import Scenario
 
 
-def rest_places(formation: Formation, hand: HandTrack) -> Vec:
-    """Returns the places (N, 3) of the rest formation about the first mapped hand, m."""
-    places: Vec = hand.point[0] + rotate(formation.rest, float(hand.yaw[0]))
-    return places
+def rest_places(formation: Formation, hand: MappedHand) -> list[Vector]:
+    """Returns the places of the rest formation about a mapped hand, m."""
+    (hx, hy, hz), turned = hand.point, [rotate((x, y, z), hand.yaw) for x, y, z in formation.rest.tolist()]
+    return [(hx + x, hy + y, hz + z) for x, y, z in turned]
 
 
-def start_fleet(
+def start_flyers(
     scenario: Scenario,
     formation: Formation,
-    places: Vec,
+    places: Sequence[Vector],
     *,
     airborne: bool,
     held: AbstractSet[int] = frozenset(),
-) -> Fleet:
+) -> list[Flyer]:
     """Places the bodies.
 
     Args:
         scenario: Says which body each drone has.
         formation: Its formation.
-        places: (k N, 3) m, the formation once or several times.
+        places: In its order, m.
         airborne: In a steady hover there, or parked on the ground below.
-        held: Rows that a hand holds in place, counted from 1.
+        held: Rows that a hand holds in place.
     """
-    bodies = [str(vehicle_settings(scenario, drone).body) for drone in formation.ids]
-    copies = len(places) // len(bodies)
-    numbered = dict(enumerate(bodies * copies, start=1))
-    fleet = park_fleet(numbered, places if airborne else places * np.array([1.0, 1.0, 0.0]))
-    return hold(hover_fleet(fleet) if airborne else fleet, held)
+    bodies = {drone: str(vehicle_settings(scenario, drone).body) for drone in formation.ids}
+    low = [(x, y, z if airborne else 0.0) for x, y, z in places]
+    parked = list(park_fleet(bodies, low).values())
+    if not airborne:
+        return parked
+    return [hover(flyer, held=row in held) for row, flyer in enumerate(parked)]

@@ -6,7 +6,6 @@ The simulated vehicle talks through real loopback sockets to a real world whose 
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
-import numpy as np
 import pytest
 
 from agents.vehicles import BACKENDS, open_vehicle
@@ -38,14 +37,14 @@ class SimStage:
 
     def __init__(self) -> None:
         self._now = 100.0
-        self._fleet = park_fleet({DRONE: "identified"}, np.array([HOME]))
+        self._fleet = park_fleet({DRONE: "identified"}, [HOME])
         self._rules = Rules(
             ids=(DRONE,),
-            columns=np.zeros((0, 2)),
+            columns=(),
             column_radius=0.12,
-            fence=(np.full(3, -9.0), np.full(3, 9.0)),
+            fence=((-9.0, -9.0, -9.0), (9.0, 9.0, 9.0)),
         )
-        self.radio = Radio(("127.0.0.1", 0), (DRONE,), np.array([False]))
+        self.radio = Radio(("127.0.0.1", 0), (DRONE,), frozenset())
         self.world = World(self._fleet, self.radio, self._rules, self._now)
         self.port = self.radio.port
         self.vehicle: Vehicle = self.open_driver()
@@ -56,7 +55,7 @@ class SimStage:
     def restart_world(self) -> None:
         self.radio.close()
         self.run(0.5, lambda: None, world=False)
-        self.radio = Radio(("127.0.0.1", self.port), (DRONE,), np.array([False]))
+        self.radio = Radio(("127.0.0.1", self.port), (DRONE,), frozenset())
         self.world = World(self._fleet, self.radio, self._rules, self._now)
 
     def run(self, seconds: float, each_step: Callable[[], None], *, world: bool = True) -> None:

@@ -11,13 +11,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from agents.vehicles.bodies.identified import step
+from agents.vehicles.bodies.fleet import BODIES
 from agents.vehicles.bodies.pid import hovering
-from agents.vehicles.bodies.state import Command, Commands, Vec
+from agents.vehicles.bodies.state import FLY
 from shared.recordings.flight_folder import read_setpoints, read_track
 from tests.replay.flights import ABSENT, flight_folders
+from tests.values import vector
+
+Vec = npt.NDArray[np.float64]
 
 SUBSTEP = 0.004
 START_SPAN = 6  # frames of 60 Hz
@@ -50,22 +54,16 @@ def read_flight(folder: Path, drone: int) -> Flight:
     )
 
 
-def fly_all(flights: list[Flight]) -> list[Vec]:
-    """Flies all bodies at once; returns (n, 2) horizontal positions at each flight's own times."""
-    state = hovering(np.array([f.position[0] for f in flights]))
-    velocity = np.array([(f.position[START_SPAN] - f.position[0]) / f.t[START_SPAN] for f in flights])
-    state = state._replace(velocity=velocity)
-    times = np.arange(0.0, max(f.t[-1] for f in flights) + SUBSTEP, SUBSTEP)
-    held = np.stack([_hold(f, times) for f in flights], axis=1)
-    kind = np.full(len(flights), Command.FLY, dtype=np.int8)
-    flown = np.empty((len(times), len(flights), 2))
-    for k in range(len(times)):
-        flown[k] = state.position[:, :2]
-        state = step(state, Commands(kind, held[k]), SUBSTEP)
-    return [
-        np.column_stack([np.interp(f.t, times, flown[:, row, axis]) for axis in (0, 1)])
-        for row, f in enumerate(flights)
-    ]
+def fly(flight: Flight) -> Vec:
+    """Flies the body; returns (n, 2) horizontal positions at the flight's own times."""
+    start = vector(flight.position[0])
+    velocity = (flight.position[START_SPAN] - flight.position[0]) / flight.t[START_SPAN]
+    body, flown = hovering(start).moved(start, vector(velocity)), []
+    times = np.arange(0.0, flight.t[-1] + SUBSTEP, SUBSTEP)
+    for held in _hold(flight, times).tolist():
+        flown.append(body.position)
+        body = BODIES["identified"].fly(body, FLY, vector(held), SUBSTEP, 1)
+    return np.column_stack([np.interp(flight.t, times, np.array(flown)[:, axis]) for axis in (0, 1)])
 
 
 def _hold(flight: Flight, times: Vec) -> Vec:
@@ -82,7 +80,7 @@ def test_identified_body_follows_the_real_drones(record_property: Callable[[str,
     flights = [read_flight(folder, drone) for folder in flight_folders() for drone in (1, 2, 3)]
     if not flights:
         pytest.skip(ABSENT)
-    errors = [flown - f.position[:, :2] for flown, f in zip(fly_all(flights), flights, strict=True)]
+    errors = [fly(f) - f.position[:, :2] for f in flights]
     lags = [_hold(f, f.t)[:, :2] - f.position[:, :2] for f in flights]
     runs = [f.run for f in flights]
     by_run, lag_by_run = rms_by_run(runs, errors), rms_by_run(runs, lags)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 from scipy.linalg import expm
 
-from deploy.lockstep.batched import fly_batched
+from deploy.lockstep.central import fly_central
 from deploy.lockstep.hand_track import relayed
 from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.record import Record
@@ -87,7 +87,7 @@ def check(uri: str, seconds: float, height_from: str) -> None:
     assert len(samples) >= seconds * RATE - 1
     scenario = rhombus(np.array(samples[0].position), height_from)
     formation = build_formation(scenario)
-    for fly in (fly_lockstep, fly_batched):
+    for fly in (fly_lockstep, fly_central):
         record = fly(scenario, formation, samples)
         moved = np.ptp(record.goal[:, 0, 0])
         assert moved > 0.2, "a hand that hardly moves proves nothing"

@@ -17,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from agents.control.goals import all_rows, goals
-from agents.control.hand import HandInput, HandSettings, map_hand
+from agents.control.goals import goal_of
+from agents.control.hand import HandInput, map_hand
 from agents.control.projection import project_exact
-from agents.control.single.vectors import ORIGIN, vector
+from agents.control.vectors import ORIGIN, Planar
+from agents.settings import drone_row, mapping
 from shared.formation import build_formation
 from shared.recordings.flight_folder import (
     HAND_FILE,
@@ -32,6 +33,7 @@ from shared.recordings.flight_folder import (
 )
 from shared.scenario import FormationSettings, Hand, Scenario
 from tests.replay.flights import each_flight
+from tests.values import vector
 
 Vec = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -68,22 +70,20 @@ def predict(folder: Path, meta: Meta) -> tuple[Ints, Vec, Vec]:
     """Runs the product's law over every hand frame: stamps, set-points before and after avoidance."""
     scenario = flown_scenario(meta)
     formation = build_formation(scenario)
-    settings = HandSettings(
-        hand=scenario.hand,
-        low=vector([*meta.low, -np.inf]),
-        high=vector([*meta.high, np.inf]),
-        radius=formation.radius,
-    )
-    hand, rows, still = read_track(folder / HAND_FILE), all_rows(formation), np.zeros((3, 3))
+    low, high = vector([*meta.low, -np.inf]), vector([*meta.high, np.inf])
+    settings = mapping(scenario.hand, low, high, formation.radius)
+    hand, rows = read_track(folder / HAND_FILE), [drone_row(scenario, formation, i) for i in formation.ids]
 
-    def wanted(position: Vec) -> Vec:
+    def wanted(position: Vec) -> list[Planar]:
         sample = HandInput(position=vector(position), velocity=ORIGIN, yaw=0.0, stamp=0.0)
-        references = np.vstack((map_hand(None, sample, settings).point, still))
-        return goals(rows, references, still, 0.0)[:, :2]
+        mapped = map_hand(None, sample, settings)
+        goals = [goal_of(row, (), mapped, [])[0] for row in rows]
+        return [(x, y) for x, y, _ in goals]
 
-    columns = np.array([(o.x, o.y) for o in read_obstacles(folder)])
-    before = np.array([wanted(position) for position in hand.position])
-    return hand.t_ns, before, project_exact(before, columns, meta.obstacle_radius)
+    columns = tuple((o.x, o.y) for o in read_obstacles(folder))
+    before = [wanted(position) for position in hand.position]
+    after = [[project_exact(goal, columns, meta.obstacle_radius) for goal in goals] for goals in before]
+    return hand.t_ns, np.array(before), np.array(after)
 
 
 def load(folder: Path) -> Flight:

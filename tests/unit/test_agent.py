@@ -264,7 +264,7 @@ class FakeVehicle:
 
 def encounters(brain: Agent, at: int) -> list[Vector]:
     """Returns where a drone believes the others to be."""
-    return [(x, y, 0.0) for x, y, *_ in brain._inputs(at, FLYING, 0.0).drones]
+    return [(each.x, each.y, 0.0) for each in brain._inputs(at, FLYING, 0.0).drones]
 
 
 def test_a_liar_moves_nobody_and_its_body_is_not_forgotten_while_it_speaks() -> None:

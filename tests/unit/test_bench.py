@@ -205,9 +205,9 @@ def test_a_tick_of_twenty_milliseconds_is_slower_than_real_time(monkeypatch: pyt
     assert record["drones"] == 2
 
 
-def test_large_swarms_run_batched() -> None:
+def test_large_swarms_run_as_a_flock() -> None:
     (record,) = lockstep.measure(drones=[lockstep.LARGEST_OF_AGENTS + 1], seconds=0.1).records
-    assert record["kind"] == "batch"
+    assert record["kind"] == "flock"
     assert record["n"] >= lockstep.FEWEST
     assert math.isfinite(record["realtime_factor"])
 

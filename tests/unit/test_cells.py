@@ -1,34 +1,36 @@
 """The cell list finds exactly the pairs that a search over all pairs finds."""
 
-import numpy as np
-import pytest
+import itertools
+
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.cells import near_pairs
+from shared.cells import Cells, Place, near_pairs
 
 COORDINATE = st.floats(-4.0, 4.0)
 
 
 @given(
-    st.lists(st.tuples(COORDINATE, COORDINATE, st.integers(0, 2)), min_size=1, max_size=40),
+    st.lists(st.tuples(COORDINATE, COORDINATE) | st.tuples(*[st.floats(-1e6, 1e6)] * 2), max_size=40),
     st.floats(0.05, 5.0),
 )
-def test_it_finds_what_all_pairs_find(placed: list[tuple[float, float, int]], reach: float) -> None:
-    points = np.array([(x, y) for x, y, _ in placed])
-    groups = np.array([group for _, _, group in placed], dtype=np.intp)
-    one, other = near_pairs(points, groups, reach)
-    gaps = points[:, None] - points
-    near = np.einsum("ijk,ijk->ij", gaps, gaps) <= reach * reach
-    near &= (groups[:, None] == groups) & ~np.eye(len(points), dtype=bool)
-    assert sorted(zip(one.tolist(), other.tolist(), strict=True)) == sorted(
-        map(tuple, np.argwhere(near).tolist())
-    )
+def test_it_finds_what_all_pairs_find(points: list[tuple[float, float]], reach: float) -> None:
+    near = {
+        (one, other)
+        for one, other in itertools.combinations(range(len(points)), 2)
+        if (points[one][0] - points[other][0]) ** 2 + (points[one][1] - points[other][1]) ** 2 <= reach * reach
+    }
+    found = near_pairs(points, reach)
+    assert len(found) == len(set(found))
+    assert set(found) == near
 
 
 def test_its_cost_does_not_grow_with_all_pairs() -> None:
-    side = np.arange(100.0)
-    points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-    one, _ = near_pairs(points, np.zeros(len(points), dtype=np.intp), 1.0)
-    assert len(one) == 2 * 2 * 100 * 99
-    assert np.bincount(one).max() == pytest.approx(4)
+    grid = Cells([Place(float(x), float(y)) for x in range(100) for y in range(100)], 1.0)
+    assert sum(len(grid.near(number)) for number in range(10_000)) == 2 * 2 * 100 * 99
+    assert max(map(len, grid.cells)) <= 4
+
+
+def test_few_points_far_apart_make_few_cells() -> None:
+    for far in (Place(1e6, 0.0), Place(1e6, 1e6)):
+        assert len(Cells([Place(0.0, 0.0), far], 0.05).cells) <= 9

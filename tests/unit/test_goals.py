@@ -1,7 +1,6 @@
-"""Goals, row by row: Eqs. 11-13 by hand, symmetries, corrections and rates (agents/control/goals.py)."""
+"""Goals, row by row: Eqs. 11-13 by hand and as a matrix, symmetries, rates (agents/control/goals.py)."""
 
 import functools
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,31 +11,34 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.control.goals import (
-    Rows,
-    agent_row,
-    all_rows,
-    corrections,
-    goal_velocities,
-    goals,
-    place_velocities,
-    rotate,
-)
-from agents.control.impedance import LinkState, rest_state
+from agents.control.goals import Guide, correction, goal_of
+from agents.control.hand import MappedHand
+from agents.control.impedance import AT_REST, LinkState
+from agents.control.vectors import ORIGIN, Vector
+from agents.settings import drone_row
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
+from shared.messages import Mode
 from shared.scenario import FormationSettings, Scenario
 from shared.shapes import HUMAN, generate
+from tests.values import vector
 
 Vec = npt.NDArray[np.float64]
+States = dict[str, LinkState]
+"""Link -> its state."""
+
+
+@functools.cache
+def scenario_of(shape: str, *overrides: str) -> Scenario:
+    return load_scenario(shape, ["formation.height_from=references", *overrides])
 
 
 @functools.cache
 def formation_of(shape: str, *overrides: str) -> Formation:
-    return build_formation(load_scenario(shape, overrides))
+    return build_formation(scenario_of(shape, *overrides))
 
 
-SCENARIO = load_scenario("rhombus")
+SCENARIO = scenario_of("rhombus")
 RHOMBUS = formation_of("rhombus")
 SHAPES = ["rhombus", "line", "vee", "grid"]
 HAND = (1.0, 2.0, 1.5)
@@ -45,19 +47,34 @@ seeds = st.integers(0, 10_000)
 angles = st.floats(-10.0, 10.0)
 
 
-def links(*displacements: Sequence[float], rates: Sequence[Sequence[float]] | None = None) -> LinkState:
-    x = np.array(displacements, dtype=np.float64)
-    return LinkState(displacement=x, rate=np.ones_like(x) if rates is None else np.array(rates))
+def links(
+    *displacements: Sequence[float], rates: Sequence[Sequence[float]] | None = None
+) -> tuple[LinkState, ...]:
+    speeds = [(1.0, 1.0, 1.0)] * len(displacements) if rates is None else rates
+    return tuple(LinkState(vector(x), vector(v)) for x, v in zip(displacements, speeds, strict=True))
 
 
-def rhombus_goal(
-    drone: int, references: Sequence[Sequence[float]], *displacements: Sequence[float]
-) -> list[float]:
+def corrected(drone: int, *states: LinkState, law: str = "paper") -> tuple[Vector, Vector]:
+    overrides = (f"swarm.law={law}", "swarm.total_limit=0.5")
+    row = drone_row(scenario_of("rhombus", *overrides), formation_of("rhombus", *overrides), drone)
+    return correction(row, states)
+
+
+def mapped(
+    point: Sequence[float], velocity: Vector = ORIGIN, yaw: float = 0.0, turning: float = 0.0
+) -> MappedHand:
+    return MappedHand(vector(point), velocity, yaw, turning, 0.0)
+
+
+def guides(points: Sequence[Sequence[float]], velocities: Sequence[Sequence[float]]) -> list[Guide]:
+    pairs = zip(points, velocities, strict=True)
+    return [Guide(vector(point), vector(velocity), Mode.FOLLOW) for point, velocity in pairs]
+
+
+def rhombus_goal(drone: int, references: Sequence[Sequence[float]], *displacements: Sequence[float]) -> Vector:
     """The goal of one drone of the rhombus with the hand at (1, 2, 1.5), yaw 0."""
-    row = agent_row(RHOMBUS, drone)
-    correction, _ = corrections(row, links(*displacements))
-    goal: list[float] = goals(row, np.array([HAND, *references]), correction, 0.0)[0].tolist()
-    return goal
+    row, lead = drone_row(SCENARIO, RHOMBUS, drone), guides(references, [ORIGIN] * len(references))
+    return goal_of(row, links(*displacements), mapped(HAND), lead)[0]
 
 
 STILL = (0.0, 0.0, 0.0)
@@ -80,37 +97,67 @@ def test_the_rhombus_in_motion_row_by_row() -> None:
     assert moved == pytest.approx([-0.80, 2.25, 1.44])
 
 
-def random_case(formation: Formation, seed: int) -> tuple[Vec, LinkState]:
+def random_case(formation: Formation, seed: int) -> tuple[Vec, States]:
     """References `[hand, drones...]` and link states, some of them beyond their limits."""
     rng = np.random.default_rng(seed)
-    count = len(formation.links)
-    state = LinkState(displacement=rng.uniform(-0.4, 0.4, (count, 3)), rate=rng.uniform(-1.0, 1.0, (count, 3)))
-    return rng.uniform(-3.0, 3.0, (1 + len(formation.ids), 3)), state
+    states = {
+        link.name: LinkState(vector(rng.uniform(-0.4, 0.4, 3)), vector(rng.uniform(-1.0, 1.0, 3)))
+        for link in formation.links
+    }
+    return rng.uniform(-3.0, 3.0, (1 + len(formation.ids), 3)), states
 
 
-def solve(rows: Rows, references: Vec, state: LinkState, yaw: float) -> Vec:
-    return goals(rows, references, corrections(rows, state)[0], yaw)
+def solve(
+    scenario: Scenario,
+    formation: Formation,
+    references: Vec,
+    states: States,
+    yaw: float,
+    velocities: Vec | None = None,
+    turning: float = 0.0,
+) -> tuple[Vec, Vec]:
+    """Goals and goal velocities of all drones."""
+    moving = np.zeros_like(references) if velocities is None else velocities
+    found = []
+    for drone in formation.ids:
+        row = drone_row(scenario, formation, drone)
+        seen = [1 + formation.row(other) for other in formation.references(drone)]
+        hand = mapped(references[0], vector(moving[0]), yaw, turning)
+        own = tuple(states[link.name] for link in row.links)
+        found.append(goal_of(row, own, hand, guides(references[seen].tolist(), moving[seen].tolist())))
+    goals, rates = zip(*found, strict=True)
+    return np.array(goals), np.array(rates)
+
+
+def about_z(angle: float) -> Vec:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 @pytest.mark.parametrize("law", ["paper", "stable"])
 @pytest.mark.parametrize("shape", SHAPES)
 @given(seed=seeds, yaw=angles)
-def test_the_matrix_is_the_rows_of_the_agents(shape: str, law: str, seed: int, yaw: float) -> None:
-    formation = formation_of(shape, f"swarm.law={law}", "formation.n=4")
-    references, state = random_case(formation, seed)
-    together = solve(all_rows(formation), references, state, yaw)
-    for drone, goal in zip(formation.ids, together, strict=True):
-        seen = [0, *(1 + formation.row(other) for other in formation.references(drone))]
-        own = [formation.links.index(link) for link in formation.links_into(drone)]
-        mine = LinkState(displacement=state.displacement[own], rate=state.rate[own])
-        assert np.allclose(solve(agent_row(formation, drone), references[seen], mine, yaw)[0], goal, atol=1e-12)
+def test_the_rows_are_those_of_the_matrix(shape: str, law: str, seed: int, yaw: float) -> None:
+    overrides = (f"swarm.law={law}", "formation.n=4")
+    formation = formation_of(shape, *overrides)
+    references, states = random_case(formation, seed)
+    corrections = np.zeros_like(formation.offsets)
+    for link in formation.links:
+        corrections[link.target] += np.clip(states[link.name].displacement, -link.limit, link.limit)
+    corrections[:, 0] = -np.abs(corrections[:, 0])
+    places = formation.offsets + formation.correction_scale * corrections
+    expected = formation.weights @ references + places @ about_z(yaw).T
+    assert np.allclose(
+        solve(scenario_of(shape, *overrides), formation, references, states, yaw)[0], expected, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_the_rest_shape_is_its_own_goal(shape: str) -> None:
     formation = formation_of(shape)
     references = np.vstack([np.zeros(3), formation.rest])
-    at_rest = solve(all_rows(formation), references, rest_state(len(formation.links)), 0.0)
+    states = {link.name: AT_REST for link in formation.links}
+    at_rest, _ = solve(scenario_of(shape), formation, references, states, 0.0)
     assert np.allclose(at_rest, formation.rest, atol=1e-12)
 
 
@@ -118,14 +165,14 @@ def test_the_rest_shape_is_its_own_goal(shape: str) -> None:
 def test_turning_and_moving_everything_turns_and_moves_the_goals(
     seed: int, yaw: float, turn: float, shift: tuple[float, ...]
 ) -> None:
-    rows = all_rows(RHOMBUS)
-    references, state = random_case(RHOMBUS, seed)
-    here = solve(rows, references, state, yaw)
-    there = solve(rows, rotate(references, turn) + np.array(shift), state, yaw + turn)
-    assert np.allclose(there, rotate(here, turn) + np.array(shift), atol=1e-9)
+    references, states = random_case(RHOMBUS, seed)
+    here, _ = solve(SCENARIO, RHOMBUS, references, states, yaw)
+    moved = references @ about_z(turn).T + np.array(shift)
+    there, _ = solve(SCENARIO, RHOMBUS, moved, states, yaw + turn)
+    assert np.allclose(there, here @ about_z(turn).T + np.array(shift), atol=1e-9)
 
 
-def renumbered(scenario: Scenario, numbers: dict[str, int]) -> Formation:
+def renumbered(scenario: Scenario, numbers: dict[str, int]) -> Scenario:
     """The same formation with other numbers on its drones."""
     drones = tuple(
         evolve(
@@ -135,66 +182,61 @@ def renumbered(scenario: Scenario, numbers: dict[str, int]) -> Formation:
         )
         for drone in generate(scenario.formation)
     )
-    return build_formation(evolve(scenario, formation=FormationSettings(shape="custom", drones=drones)))
+    custom = FormationSettings(shape="custom", drones=drones, height_from="references")
+    return evolve(scenario, formation=custom)
 
 
 @given(seed=seeds, yaw=angles, order=st.permutations([1, 2, 3, 4]))
 def test_the_numbers_of_the_drones_do_not_matter(seed: int, yaw: float, order: list[int]) -> None:
-    references, state = random_case(RHOMBUS, seed)
+    references, states = random_case(RHOMBUS, seed)
     numbers = {str(drone): order[drone - 1] for drone in RHOMBUS.ids}
     other = renumbered(SCENARIO, numbers)
+    formation = build_formation(other)
 
     def renamed(link: str) -> str:
         return "-".join(part if part == HUMAN else str(numbers[part]) for part in link.split("-"))
 
-    rows = [order.index(number) for number in other.ids]
-    names = [renamed(link.name) for link in RHOMBUS.links]
-    moved = [names.index(link.name) for link in other.links]
-    permuted = LinkState(displacement=state.displacement[moved], rate=state.rate[moved])
-    expected = solve(all_rows(RHOMBUS), references, state, yaw)[rows]
-    found = solve(all_rows(other), references[[0, *(1 + row for row in rows)]], permuted, yaw)
-    assert np.allclose(found, expected, atol=1e-12)
+    rows = [order.index(number) for number in formation.ids]
+    permuted = {renamed(name): state for name, state in states.items()}
+    expected, _ = solve(SCENARIO, RHOMBUS, references, states, yaw)
+    found, _ = solve(other, formation, references[[0, *(1 + row for row in rows)]], permuted, yaw)
+    assert np.allclose(found, expected[rows], atol=1e-12)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 @given(seed=seeds)
 def test_a_correction_never_leads_towards_the_human_and_has_its_bound(shape: str, seed: int) -> None:
     formation = formation_of(shape)
-    _, state = random_case(formation, seed)
-    rows = all_rows(formation)
-    correction, _ = corrections(rows, state)
-    assert (correction[:, 0] <= 0.0).all()
-    assert (np.abs(correction) <= rows.scale * rows.sum_links(rows.limits) + 1e-12).all()
+    _, states = random_case(formation, seed)
+    for drone in formation.ids:
+        row = drone_row(scenario_of(shape), formation, drone)
+        moved, _ = correction(row, tuple(states[link.name] for link in row.links))
+        assert moved[0] <= 0.0
+        assert max(map(abs, moved)) <= row.scale * sum(link.limit for link in row.links) + 1e-12
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_x_leads_away_whichever_way_the_link_gives_while_y_and_z_keep_their_sign(sign: float) -> None:
-    correction, rate = corrections(agent_row(RHOMBUS, 1), links((0.1 * sign, 0.2 * sign, 0.05 * sign)))
-    assert correction[0] == pytest.approx([-0.1, 0.2 * sign, 0.05 * sign])
-    assert rate[0] == pytest.approx([-sign, 1.0, 1.0])
+    moved, rate = corrected(1, *links((0.1 * sign, 0.2 * sign, 0.05 * sign)))
+    assert moved == pytest.approx([-0.1, 0.2 * sign, 0.05 * sign])
+    assert rate == pytest.approx([-sign, 1.0, 1.0])
 
 
 def test_a_clamped_term_has_no_rate_and_the_others_keep_theirs() -> None:
-    correction, rate = corrections(
-        agent_row(RHOMBUS, 4),
-        links((0.30, 0.10, -0.9), (0.05, -0.70, 0.1), rates=[(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)]),
-    )
-    assert correction[0] == pytest.approx([-0.30, -0.15, -0.15])
-    assert rate[0] == pytest.approx([-4.0, 2.0, 6.0])
+    states = links((0.30, 0.10, -0.9), (0.05, -0.70, 0.1), rates=[(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)])
+    moved, rate = corrected(4, *states)
+    assert moved == pytest.approx([-0.30, -0.15, -0.15])
+    assert rate == pytest.approx([-4.0, 2.0, 6.0])
 
 
 def test_the_stable_law_scales_corrections_and_rates_alike() -> None:
-    formation = formation_of("rhombus", "swarm.law=stable", "swarm.total_limit=0.5")
     # Three hops of 0.25, 0.25 and 2 x 0.25 m sum up to 1 m.
-    assert formation.correction_scale == pytest.approx(0.5)
-    correction, rate = corrections(agent_row(formation, 1), links((0.1, 0.2, 0.0)))
-    assert correction[0] == pytest.approx([-0.05, 0.1, 0.0])
-    assert rate[0] == pytest.approx([-0.5, 0.5, 0.5])
-
-
-def test_turning_is_anticlockwise_about_z() -> None:
-    assert rotate(np.array([1.0, 2.0, 3.0]), math.pi / 2) == pytest.approx([-2.0, 1.0, 3.0])
-    assert rotate(np.array([[1.0, 0.0, 0.0]] * 2), np.array([0.0, math.pi]))[:, 0] == pytest.approx([1.0, -1.0])
+    assert formation_of(
+        "rhombus", "swarm.law=stable", "swarm.total_limit=0.5"
+    ).correction_scale == pytest.approx(0.5)
+    moved, rate = corrected(1, *links((0.1, 0.2, 0.0)), law="stable")
+    assert moved == pytest.approx([-0.05, 0.1, 0.0])
+    assert rate == pytest.approx([-0.5, 0.5, 0.5])
 
 
 @pytest.mark.parametrize("law", ["paper", "stable"])
@@ -202,19 +244,22 @@ def test_turning_is_anticlockwise_about_z() -> None:
 def test_the_goal_velocity_is_the_derivative_of_the_goal(
     law: str, data: Any, yaw: float, yaw_rate: float, seed: int
 ) -> None:
-    formation = formation_of("rhombus", f"swarm.law={law}")
-    rows, rng = all_rows(formation), np.random.default_rng(seed)
+    override = f"swarm.law={law}"
+    scenario, formation = scenario_of("rhombus", override), formation_of("rhombus", override)
+    rng = np.random.default_rng(seed)
     references, velocities = rng.uniform(-3.0, 3.0, (2, 5, 3))
     # Off the corners of the absolute value and of the clamp: same signs of all links, inside or outside.
     size = data.draw(st.sampled_from([0.1, 0.4])) * rng.uniform(0.8, 1.2, (5, 3))
-    state = LinkState(displacement=size * rng.choice([-1.0, 1.0], 3), rate=rng.uniform(-1.0, 1.0, (5, 3)))
+    displacement, rate = size * rng.choice([-1.0, 1.0], 3), rng.uniform(-1.0, 1.0, (5, 3))
+
+    def states(t: float) -> States:
+        pairs = zip(formation.links, displacement + rate * t, rate, strict=True)
+        return {link.name: LinkState(vector(x), vector(v)) for link, x, v in pairs}
 
     def at(t: float) -> Vec:
-        moved = LinkState(displacement=state.displacement + state.rate * t, rate=state.rate)
-        return solve(rows, references + velocities * t, moved, yaw + yaw_rate * t)
+        return solve(scenario, formation, references + velocities * t, states(t), yaw + yaw_rate * t)[0]
 
-    correction, rate = corrections(rows, state)
-    places = place_velocities(rows, correction, rate, yaw, yaw_rate)
     step = 1e-4
     slope = (at(step) - at(-step)) / (2.0 * step)
-    assert np.allclose(goal_velocities(rows, velocities, places), slope, atol=1e-6)
+    _, found = solve(scenario, formation, references, states(0.0), yaw, velocities, yaw_rate)
+    assert np.allclose(found, slope, atol=1e-6)

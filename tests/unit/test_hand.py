@@ -20,12 +20,12 @@ from agents.control.hand import (
     freeze,
     map_hand,
 )
-from agents.control.single.vectors import vector
-from agents.settings import hand_settings
+from agents.settings import hand_settings, mapping
 from shared.config import load_scenario
 from shared.formation import build_formation
 from shared.messages import MAX_POSITION, MAX_VELOCITY
 from shared.scenario import Hand
+from tests.values import vector
 
 Vec = npt.NDArray[np.float64]
 Points = Sequence[float] | Vec
@@ -38,7 +38,7 @@ gaps = st.floats(0.0, 0.3)
 
 
 def settings(radius: float = 1.5, low: Vec = -FAR, high: Vec = FAR, **hand: Any) -> HandSettings:
-    return HandSettings(hand=Hand(**hand), low=vector(low), high=vector(high), radius=radius)
+    return mapping(Hand(**hand), vector(low), vector(high), radius)
 
 
 def sample(

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from agents.control.impedance import LinkState, discretise, rest_state, step_links, transition_rows
+from agents.control.impedance import AT_REST, LinkState, Spring, discretise, step_links
+from agents.settings import drone_row
 from shared.config import load_scenario
 from shared.formation import build_formation
 
@@ -97,23 +98,31 @@ def test_no_parameters_overflow(mass: float, damping: float, stiffness: float, d
 
 @given(st.lists(steps, min_size=1, max_size=5))
 def test_links_step_axis_by_axis_like_one_matrix(times: list[float]) -> None:
-    formation = build_formation(load_scenario("rhombus"))
-    state = rest_state(len(formation.links))
+    scenario = load_scenario("rhombus")
+    links = drone_row(scenario, build_formation(scenario), 4).links
+    states: tuple[LinkState, ...] = (AT_REST, AT_REST)
     one = np.zeros((2, 3))
-    velocity = np.array([0.4, -0.2, 0.1])
+    velocity = (0.4, -0.2, 0.1)
     for dt in times:
-        state = step_links(state, transition_rows(formation.links, dt), velocity)
+        states = step_links(states, links, velocity, dt)
         ad_bd = matrices(PAPER, dt)
         one = ad_bd[:, :2] @ one + np.outer(ad_bd[:, 2], velocity)
-    assert state.displacement == pytest.approx(np.tile(one[0], (len(formation.links), 1)))
-    assert state.rate == pytest.approx(np.tile(one[1], (len(formation.links), 1)))
+    for state in states:
+        assert state.displacement == pytest.approx(one[0])
+        assert state.rate == pytest.approx(one[1])
+
+
+@given(st.lists(st.sampled_from([1 / 60, 1 / 120, 0.02]), min_size=1, max_size=8))
+def test_a_spring_remembers_only_what_is_still_true(times: list[float]) -> None:
+    spring = Spring(*PAPER)
+    assert [spring.over(dt) for dt in times] == [discretise(*PAPER, dt) for dt in times]
 
 
 def test_links_with_their_own_parameters_move_differently() -> None:
     scenario = load_scenario("rhombus", ['impedance.links=[{name="2-4", stiffness=84.0}]'])
-    formation = build_formation(scenario)
-    state: LinkState = rest_state(len(formation.links))
+    links = drone_row(scenario, build_formation(scenario), 4).links
+    states: tuple[LinkState, ...] = (AT_REST, AT_REST)
     for _ in range(600):
-        state = step_links(state, transition_rows(formation.links, 1 / 60), np.array([0.3, 0.0, 0.0]))
-    by_name = {link.name: x[0] for link, x in zip(formation.links, state.displacement, strict=True)}
+        states = step_links(states, links, (0.3, 0.0, 0.0), 1 / 60)
+    by_name = {link.name: state.displacement[0] for link, state in zip(links, states, strict=True)}
     assert by_name["2-4"] == pytest.approx(by_name["3-4"] / 4.0)

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
-from agents.control.modes import AIRBORNE_MODES
+from agents.control.modes import is_airborne
 from agents.control.steering import ESCAPE_ACCELERATION, HAND_SPEED_FACTOR, LONGEST_STEP
 from agents.control.step import Inputs, Settings, State, start, step
 from shared.messages import Mode, Vector, Wish
 from tests.unit.test_step import REST, TICK, drones, hand, inputs, reference, settings, towards
+from tests.values import replace
 
 CALM_S, REST_S = 1.0, 12.0
 HAND_SPEED = 1.5
@@ -45,7 +45,7 @@ moments = st.fixed_dictionaries(
         "wish": st.sampled_from([Wish.FLY, Wish.FLY, Wish.HOLD, Wish.GROUND, Wish.LAND]),
         "hand_age": ages,
         "hand_fresh": st.booleans(),
-        "references": st.tuples(known, known, known),
+        "references": st.lists(known, min_size=3, max_size=3),
         "drones": st.lists(places, max_size=3).map(lambda found: drones(*found)),
     }
 )
@@ -66,7 +66,7 @@ class Life:
             self.state, output = step(self.state, replace(now, position=self.position), self.rules, TICK)
             mode = self.state.mode.mode
             self.setpoints.append((mode, output.setpoint))
-            goal = output.setpoint if mode in AIRBORNE_MODES else (*self.position[:2], 0.0)
+            goal = output.setpoint if is_airborne(mode) else (*self.position[:2], 0.0)
             self.position = towards(self.position, goal, BODY_SHARE)
 
 
@@ -84,11 +84,11 @@ def test_no_sequence_moves_the_set_point_faster_than_the_limits(
 ) -> None:
     rules = settings(4, f"swarm.law={law}")
     life = lived(rules, story, airborne=airborne)
-    limits, tau = rules.steering.limits, rules.steering.tau
+    limits, tau = rules.steering, rules.steering.tau
     fastest = max(limits.speed, HAND_SPEED_FACTOR * HAND_SPEED)
     lead = tau * ESCAPE_ACCELERATION * limits.acceleration
     for (before, a), (after, b) in itertools.pairwise(life.setpoints):
-        if before in AIRBORNE_MODES and after in AIRBORNE_MODES:
+        if is_airborne(before) and is_airborne(after):
             assert math.dist(a, b) <= (fastest + lead) * min(TICK, LONGEST_STEP) + 1e-9
 
 

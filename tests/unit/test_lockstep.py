@@ -1,4 +1,4 @@
-"""The simulators: agents in lockstep, the batch, and that they agree."""
+"""The simulators: agents in lockstep, one central computer, and that they agree."""
 
 import csv
 import hashlib
@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from agents.vehicles.world.setup import referee_rules
-from deploy.lockstep.batched import fly_batched
+from deploy.lockstep.central import fly_central
 from deploy.lockstep.hand_track import relayed
 from deploy.lockstep.lockstep import Lockstep, fly_lockstep
 from deploy.lockstep.record import Record, judge, write_csv
-from deploy.lockstep.start import start_fleet
+from deploy.lockstep.start import start_flyers
 from shared.config import load_scenario
 from shared.formation import build_formation
 from shared.messages import HandSample, Mode, Wish
@@ -29,7 +29,7 @@ SLOW = 0.25
 
 def fly_both(scenario: Scenario, hand: list[HandSample]) -> tuple[Record, Record]:
     formation = build_formation(scenario)
-    return fly_lockstep(scenario, formation, hand), fly_batched(scenario, formation, hand)
+    return fly_lockstep(scenario, formation, hand), fly_central(scenario, formation, hand)
 
 
 @pytest.mark.parametrize("height_from", ["hand", "references"])
@@ -80,7 +80,9 @@ def test_the_same_inputs_give_the_same_bytes() -> None:
 
     def digest() -> str:
         swarm = Lockstep(
-            scenario, formation, start_fleet(scenario, formation, REST + formation.rest, airborne=True)
+            scenario,
+            formation,
+            start_flyers(scenario, formation, (REST + formation.rest).tolist(), airborne=True),
         )
         total = hashlib.sha256()
         for sample in hand:
@@ -113,7 +115,7 @@ def test_it_takes_off_from_the_ground_follows_and_lands() -> None:
         ((move[-1].position, (0.0, 0.0, 0.0), Wish.LAND) for _ in range(480)),
     )
     swarm = Lockstep(
-        scenario, formation, start_fleet(scenario, formation, REST + formation.rest, airborne=False)
+        scenario, formation, start_flyers(scenario, formation, (REST + formation.rest).tolist(), airborne=False)
     )
     seen: list[set[Mode]] = [set() for _ in formation.ids]
     for k, (position, velocity, wish) in enumerate(wishes):

@@ -3,33 +3,33 @@
 import math
 from itertools import combinations
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.vehicles.world.referee import RefereeState, Rules, report, start_referee, update
+from agents.vehicles.world.referee import RefereeState, Rules, report, update
+from shared.messages import ORIGIN, Vector
 
 IDS = (1, 2, 4, 7)
-AIR = np.ones(4, dtype=bool)
-APART = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0]])
+AIR, DOWN = [True] * 4, [False] * 4
+APART: list[Vector] = [(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0), (1.0, 1.0, 1.0)]
 
 coordinates = st.floats(-2.0, 2.0)
 places = st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=4, max_size=4)
 instants = st.lists(st.tuples(places, st.tuples(*[st.booleans()] * 4)), min_size=1, max_size=5)
 
 
-def make_rules(columns: "np.typing.NDArray[np.float64] | None" = None) -> Rules:
+def make_rules(*columns: tuple[float, float]) -> Rules:
     return Rules(
         ids=IDS,
-        columns=np.zeros((0, 2)) if columns is None else columns,
+        columns=columns,
         column_radius=0.12,
-        fence=(np.array([-3.0, -3.0, -0.1]), np.array([3.0, 3.0, 3.0])),
+        fence=((-3.0, -3.0, -0.1), (3.0, 3.0, 3.0)),
     )
 
 
-def watch(rules: Rules, *track: "np.typing.NDArray[np.float64]") -> RefereeState:
-    state = start_referee(rules)
+def watch(rules: Rules, *track: list[Vector]) -> RefereeState:
+    state = RefereeState()
     for t, positions in enumerate(track):
         state = update(rules, state, positions, AIR, hand=None, t=float(t))
     return state
@@ -39,11 +39,11 @@ def watch(rules: Rules, *track: "np.typing.NDArray[np.float64]") -> RefereeState
 def test_smallest_distances_are_those_of_brute_force(
     seen: list[tuple[list[tuple[float, float, float]], tuple[bool, ...]]],
 ) -> None:
-    rules, hand = make_rules(), np.array([0.5, 0.5, 1.0])
-    state = start_referee(rules)
+    rules, hand = make_rules(), (0.5, 0.5, 1.0)
+    state = RefereeState()
     pair = to_hand = math.inf
     for t, (points, flying) in enumerate(seen):
-        state = update(rules, state, np.array(points), np.array(flying), hand=hand, t=float(t))
+        state = update(rules, state, points, flying, hand=hand, t=float(t))
         for i, j in combinations(range(4), 2):
             if flying[i] or flying[j]:
                 pair = min(pair, math.dist(points[i], points[j]))
@@ -74,7 +74,7 @@ def test_just_outside_contact_is_no_collision() -> None:
 
 
 def test_column_contact_has_no_height() -> None:
-    near, clear = np.array([[0.17, 0.0]]), np.array([[-0.19, 0.0]])
+    near, clear = (0.17, 0.0), (-0.19, 0.0)
     assert report(watch(make_rules(near), APART, APART))["column_contacts"] == 1
     assert report(watch(make_rules(near), APART))["collisions"] == 1
     assert report(watch(make_rules(clear), APART))["collisions"] == 0
@@ -82,16 +82,16 @@ def test_column_contact_has_no_height() -> None:
 
 def test_fence_exit_counts_once_per_episode_and_only_in_the_air() -> None:
     out = APART.copy()
-    out[2, 1] = 3.1
+    out[2] = (0.0, 3.1, 1.0)
     rules = make_rules()
     assert report(watch(rules, APART, out, out, APART, out))["fence_exits"] == 2
-    state = update(rules, start_referee(rules), out, np.zeros(4, dtype=bool), hand=None, t=0.0)
+    state = update(rules, RefereeState(), out, DOWN, hand=None, t=0.0)
     assert report(state)["fence_exits"] == 0
 
 
 def test_grounded_drones_do_not_count() -> None:
-    rules, close = make_rules(), np.zeros((4, 3))
-    state = update(rules, start_referee(rules), close, np.zeros(4, dtype=bool), hand=np.zeros(3), t=0.0)
+    rules, close = make_rules(), [ORIGIN] * 4
+    state = update(rules, RefereeState(), close, DOWN, hand=ORIGIN, t=0.0)
     assert report(state) == {"collisions": 0, "column_contacts": 0, "fence_exits": 0}
 
 
@@ -99,6 +99,6 @@ def test_landing_ends_an_episode() -> None:
     rules, close = make_rules(), APART.copy()
     close[1] = (0.1, 0.0, 1.0)
     state = watch(rules, close)
-    state = update(rules, state, close, np.zeros(4, dtype=bool), hand=None, t=1.0)
+    state = update(rules, state, close, DOWN, hand=None, t=1.0)
     state = update(rules, state, close, AIR, hand=None, t=2.0)
     assert report(state)["collisions"] == 2

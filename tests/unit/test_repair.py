@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from agents.agent import FORGOTTEN_AFTER, Agent
 from agents.control.modes import CRITICAL_BATTERY, LOW_BATTERY, POSE_LOST
-from agents.control.single.repair import BLEND, REFERENCE_LOST, RETURN_AFTER, Reference, kin_order
+from agents.control.repair import BLEND, REFERENCE_LOST, RETURN_AFTER, Reference, kin_order
 from agents.control.step import Output, Settings, State, step
 from agents.settings import agent_settings
 from agents.vehicles.base import Pose
@@ -23,7 +22,8 @@ from shared.messages import Flag, Mode, Vector, Wish
 from shared.topics import DRONE_STATE
 from shared.transport import Arrival
 from tests.unit.test_agent import state as drone_state
-from tests.unit.test_step import REST, TICK, hand, hovering, inputs, reference, repeat, settings
+from tests.unit.test_step import REST, TICK, hand, hovering, inputs, reference, repeat, said, settings
+from tests.values import replace
 
 GONE = None
 SILENT_1 = reference(REST[1], age=REFERENCE_LOST + 0.01, fresh=False)
@@ -42,27 +42,27 @@ def fly(state: State, drone: int, rules: Settings, seconds: float, **changes: ob
 @pytest.mark.parametrize(
     ("drone", "references"),
     [
-        (2, (SILENT_1,)),
-        (2, (GONE,)),
-        (2, (reference(REST[1], mode=Mode.LAND),)),
-        (4, (SILENT_2, reference(REST[3]))),
-        (4, (SILENT_2, SILENT_3)),
-        (4, (GONE, GONE)),
+        (2, [SILENT_1]),
+        (2, [GONE]),
+        (2, [reference(REST[1], mode=Mode.LAND)]),
+        (4, [SILENT_2, reference(REST[3])]),
+        (4, [SILENT_2, SILENT_3]),
+        (4, [GONE, GONE]),
     ],
 )
 def test_at_rest_the_formation_keeps_its_shape_whoever_is_gone(
-    drone: int, references: tuple[Reference | None, ...]
+    drone: int, references: list[Reference | None]
 ) -> None:
     rules = settings(drone)
     for output in fly(hovering(drone, rules), drone, rules, 3.0, references=references):
         assert output.goal == pytest.approx(REST[drone], abs=1e-9)
-        assert Flag.REPAIRED in output.flags
-        assert Flag.REFERENCE_LOST not in output.flags
+        assert Flag.REPAIRED in said(output)
+        assert Flag.REFERENCE_LOST not in said(output)
 
 
 def test_with_every_ancestor_gone_the_human_leads_alone() -> None:
     rules = settings(4)
-    state, now = hovering(4, rules), replace(inputs(4), references=(SILENT_2, SILENT_3, SILENT_1))
+    state, now = hovering(4, rules), replace(inputs(4), references=[SILENT_2, SILENT_3, SILENT_1])
     for k in range(120):
         moved = hand(-0.3 * k * TICK, velocity=(-0.3, 0, 0), stamp=k * TICK)
         state, output = step(state, replace(now, hand=moved), rules, TICK)
@@ -78,8 +78,8 @@ def test_a_stand_in_moves_its_links_as_the_lost_drone_would() -> None:
         velocity = 0.4 * math.sin(2.0 * math.pi * k / 120)
         moved = hand(-0.2 * math.sin(math.pi * k / 120) ** 2, velocity=(-velocity, 0, 0), stamp=k * TICK)
         leader, led = step(leader, inputs(1, hand=moved), lead, TICK)
-        follower, output = step(follower, inputs(2, hand=moved, references=(SILENT_1,)), rules, TICK)
-    expected = inputs(2, hand=moved, references=(reference(led.goal),))
+        follower, output = step(follower, inputs(2, hand=moved, references=[SILENT_1]), rules, TICK)
+    expected = inputs(2, hand=moved, references=[reference(led.goal)])
     healthy = replace(follower, stand_ins=hovering(2, rules).stand_ins)
     _, wanted = step(healthy, expected, rules, TICK)
     assert output.goal == pytest.approx(wanted.goal, abs=0.02)
@@ -89,9 +89,9 @@ def test_the_stand_in_takes_over_and_gives_back_without_a_jump() -> None:
     rules = settings(2)
     astray = (REST[1][0] - 0.4, 0.3, 1.2)
     state = hovering(2, rules)
-    state, _ = repeat(state, inputs(2, references=(reference(astray),)), rules, 3.0)
+    state, _ = repeat(state, inputs(2, references=[reference(astray)]), rules, 3.0)
     lost = reference(astray, age=REFERENCE_LOST + 0.01, fresh=False)
-    goals = [output.goal for output in fly(state, 2, rules, BLEND + 0.5, references=(lost,))]
+    goals = [output.goal for output in fly(state, 2, rules, BLEND + 0.5, references=[lost])]
     longest = math.dist(astray, REST[1]) * TICK / BLEND
     assert max(math.dist(a, b) for a, b in itertools.pairwise(goals)) <= 1.01 * longest
     assert goals[-1] == pytest.approx(REST[2], abs=1e-9)
@@ -99,36 +99,36 @@ def test_the_stand_in_takes_over_and_gives_back_without_a_jump() -> None:
 
 def test_who_is_back_is_trusted_only_after_a_while() -> None:
     rules = settings(2)
-    state, _ = repeat(hovering(2, rules), inputs(2, references=(SILENT_1,)), rules, 2.0)
+    state, _ = repeat(hovering(2, rules), inputs(2, references=[SILENT_1]), rules, 2.0)
     astray = reference((REST[1][0] - 0.4, 0.3, 1.2))
     flickering = [astray if k % 30 else SILENT_1 for k in range(180)]
     for known in flickering:
-        state, output = step(state, inputs(2, references=(known,)), rules, TICK)
+        state, output = step(state, inputs(2, references=[known]), rules, TICK)
         assert output.goal == pytest.approx(REST[2], abs=1e-9)
-    back = fly(state, 2, rules, RETURN_AFTER + BLEND + 0.2, references=(astray,))
+    back = fly(state, 2, rules, RETURN_AFTER + BLEND + 0.2, references=[astray])
     before = [o for k, o in enumerate(back) if k * TICK < RETURN_AFTER - 0.6]
     assert all(o.goal == pytest.approx(REST[2], abs=1e-9) for o in before)
     assert back[-1].goal == pytest.approx(np.add(REST[2], (-0.4, 0.3, 0.0)), abs=1e-9)
-    assert Flag.REPAIRED not in back[-1].flags
+    assert Flag.REPAIRED not in said(back[-1])
 
 
 def test_a_holding_drone_behind_a_lost_one_is_held() -> None:
     """A follower of a lost follower of one that holds does not fly on alone."""
     rules = settings(4)
-    holding = replace(inputs(4), references=(SILENT_2, SILENT_3, reference(REST[1], mode=Mode.HOLD)))
+    holding = replace(inputs(4), references=[SILENT_2, SILENT_3, reference(REST[1], mode=Mode.HOLD)])
     state, _ = repeat(hovering(4, rules), holding, rules, 1.0)
     assert state.mode.mode is Mode.HOLD
-    following = replace(holding, references=(SILENT_2, SILENT_3, reference(REST[1])))
+    following = replace(holding, references=[SILENT_2, SILENT_3, reference(REST[1])])
     state, _ = repeat(state, following, rules, 0.1)
     assert state.mode.mode is Mode.FOLLOW
 
 
 def test_nobody_is_replaced_while_the_swarm_lands_or_waits_on_the_ground() -> None:
     rules = settings(2)
-    down = inputs(2, wish=Wish.LAND, references=(reference(REST[1], mode=Mode.LAND),))
+    down = inputs(2, wish=Wish.LAND, references=[reference(REST[1], mode=Mode.LAND)])
     state, output = repeat(hovering(2, rules), down, rules, 1.0)
     assert state.mode.mode is Mode.LAND
-    assert Flag.REPAIRED not in output.flags
+    assert Flag.REPAIRED not in said(output)
 
 
 @given(
@@ -152,7 +152,7 @@ def test_kin_are_all_ancestors_each_once_and_the_references_first(chosen: list[l
 def test_a_low_battery_is_told_and_a_critical_one_lands(battery: float, flag: Flag) -> None:
     rules = settings(1)
     state, output = repeat(hovering(1, rules), inputs(1, battery=battery), rules, 0.5)
-    assert flag in output.flags
+    assert flag in said(output)
     assert state.mode.mode is (Mode.LAND if flag is Flag.CRITICAL_BATTERY else Mode.FOLLOW)
     assert state.mode.must_ask_again is (flag is Flag.CRITICAL_BATTERY)
 
@@ -160,7 +160,7 @@ def test_a_low_battery_is_told_and_a_critical_one_lands(battery: float, flag: Fl
 def test_an_old_pose_is_told_and_a_lost_one_descends_open_loop_until_the_motors_stop() -> None:
     rules = settings(1)
     state, output = repeat(hovering(1, rules), inputs(1, pose_age=POSE_LOST - 0.01), rules, 0.2)
-    assert Flag.OLD_POSE in output.flags
+    assert Flag.OLD_POSE in said(output)
     assert state.mode.mode is Mode.FOLLOW
     blind = inputs(1, pose_age=POSE_LOST + 0.01)
     state, output = repeat(state, blind, rules, 0.2)

@@ -1,7 +1,7 @@
 """Nobody comes too near: drones, hand, fence, columns, over strokes in all directions (3-D distances, m).
 
 Strokes are minimum-jerk, from the rest formation, with the `identified` body. All runs of a row fly side by
-side in the batched simulator; the worst of them fly again with real agents in lockstep.
+side, each under one central computer; the worst of them fly again with real agents in lockstep.
 """
 
 import itertools

@@ -11,7 +11,8 @@ from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
 
 from agents import __main__ as agent_process
-from agents.control.impedance import LinkState, step_links, transition_rows
+from agents.control.impedance import AT_REST, LinkState, Spring, step_links
+from agents.control.impedance import Link as LawLink
 from agents.vehicles.world import __main__ as world_process
 from deploy.cli import main
 from deploy.doctor.finding import Verdict
@@ -188,12 +189,13 @@ def test_no_hand_makes_a_link_give_way_by_more_than_its_bound(link: Link) -> Non
     """The worst hand turns round at every half period of the link."""
     dt, speed = 0.005, 1.0
     half = np.pi / np.sqrt(max(link.stiffness / link.mass - (link.damping / (2 * link.mass)) ** 2, 1e-2))
-    rows = transition_rows((link,), dt)
-    state = LinkState(displacement=np.zeros((1, 3)), rate=np.zeros((1, 3)))
-    worst = 0.0
+    spring = Spring(link.mass, link.damping, link.stiffness, link.gain)
+    own, worst = (LawLink(link.name, spring, link.limit),), 0.0
+    states: tuple[LinkState, ...] = (AT_REST,)
     for k in range(2000):
-        state = step_links(state, rows, np.full(3, speed if int(k * dt / half) % 2 else -speed))
-        worst = max(worst, float(np.abs(state.displacement).max()))
+        u = speed if int(k * dt / half) % 2 else -speed
+        states = step_links(states, own, (u, u, u), dt)
+        worst = max(worst, *map(abs, states[0].displacement))
     assert worst <= largest_displacement(link, speed) * (1.0 + 1e-6) + 1e-9
 
 

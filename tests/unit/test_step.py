@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from msgspec.structs import replace
 
 from agents.agent import Agent
+from agents.control.avoidance import Encounter
 from agents.control.hand import HandInput
-from agents.control.single.avoidance import Encounter
-from agents.control.single.repair import EXTRAPOLATION, Reference
-from agents.control.single.vectors import vector
+from agents.control.repair import EXTRAPOLATION, Reference
+from agents.control.steering import Bystander
 from agents.control.step import Inputs, Output, Settings, State, start, step
 from agents.settings import agent_settings
 from agents.vehicles.base import Pose
@@ -26,6 +25,7 @@ from shared.formation import build_formation
 from shared.messages import NO_HAND, ORIGIN, Flag, HandSample, Mode, Vector, Wish
 from shared.topics import HAND
 from shared.transport import Arrival
+from tests.values import replace, vector
 
 Triple = Sequence[float]
 
@@ -53,7 +53,11 @@ def reference(point: Triple, **changes: Any) -> Reference:
 
 
 def drones(*places: Triple) -> list[Encounter]:
-    return [(x, y, 0.0, 0.0) for x, y, _ in places]
+    return [Encounter(x, y, 0.0, 0.0) for x, y, _ in places]
+
+
+def said(output: Output) -> Flag:
+    return Flag(output.flags)
 
 
 def inputs(drone: int, **changes: Any) -> Inputs:
@@ -67,17 +71,13 @@ def inputs(drone: int, **changes: Any) -> Inputs:
         wish=Wish.FLY,
         hand_age=0.0,
         hand_fresh=True,
-        references={
-            1: (),
-            2: (reference(REST[1]),),
-            3: (reference(REST[1]),),
-            4: (reference(REST[2]), reference(REST[3])),
-        }[drone],
+        references=[reference(REST[other]) for other in {1: (), 2: (1,), 3: (1,), 4: (2, 3)}[drone]],
         drones=drones(),
+        silent=[],
     )
     now = replace(calm, **changes)
     # Drone 4 knows its ancestor, drone 1, too.
-    return replace(now, references=(*now.references, reference(REST[1]))) if drone == 4 else now
+    return replace(now, references=[*now.references, *([reference(REST[1])] if drone == 4 else [])])
 
 
 def hovering(drone: int, rules: Settings) -> State:
@@ -110,16 +110,16 @@ def moved_links(drone: int, rules: Settings) -> State:
 
 def test_following_takes_the_goal_from_hand_references_and_links() -> None:
     rules = settings(4)
-    references = (reference((-1.1, 0.6, 1.2)), reference((-1.2, -0.3, 1.2)))
+    references = [reference((-1.1, 0.6, 1.2)), reference((-1.2, -0.3, 1.2))]
     _, output = step(hovering(4, rules), inputs(4, references=references), rules, TICK)
     assert output.goal == pytest.approx([-1.65, 0.15, 1.2])
-    assert output.flags == Flag(0)
+    assert said(output) == Flag(0)
 
 
 @pytest.mark.parametrize(("height_from", "height"), [("hand", 1.2), ("references", 1.5)])
 def test_the_height_of_a_reference_is_its_own_or_the_hands(height_from: str, height: float) -> None:
     rules = settings(2, f"formation.height_from={height_from}")
-    _, output = step(hovering(2, rules), inputs(2, references=(reference((-0.5, 0.0, 1.5)),)), rules, TICK)
+    _, output = step(hovering(2, rules), inputs(2, references=[reference((-0.5, 0.0, 1.5))]), rules, TICK)
     assert output.goal == pytest.approx([-1.0, 0.5, height])
 
 
@@ -131,7 +131,7 @@ def test_hold_relaxes_the_links_freezes_the_hand_and_keeps_following_the_referen
     for k in range(180):
         drifting = reference((-0.5 - 0.1 * k * TICK, 0.0, 1.2), mode=Mode.HOLD)
         runaway = hand(5.0, velocity=(1, 0, 0), stamp=1.0 + k * TICK)
-        held = inputs(2, hand=runaway, wish=Wish.HOLD, references=(drifting,))
+        held = inputs(2, hand=runaway, wish=Wish.HOLD, references=[drifting])
         state, output = step(state, held, rules, TICK)
     assert state.mode.mode is Mode.HOLD
     assert max(abs(x) for link in state.links for x in link.displacement) < 0.002
@@ -139,7 +139,7 @@ def test_hold_relaxes_the_links_freezes_the_hand_and_keeps_following_the_referen
     assert state.hand.point == where
     assert state.hand.velocity == (0.0, 0.0, 0.0)
     assert output.goal == pytest.approx(np.add(drifting.point, (-0.5, 0.5, 0.0)), abs=0.002)
-    assert Flag.REFERENCE_LOST not in output.flags
+    assert Flag.REFERENCE_LOST not in said(output)
 
 
 @pytest.mark.parametrize("mode", [Mode.GROUND, Mode.TAKEOFF])
@@ -149,15 +149,15 @@ def test_until_its_reference_has_joined_a_drone_holds_its_own_position(mode: Mod
     blown = (REST[2][0] + 0.2, *REST[2][1:])
     state, _ = step(hovering(2, rules), inputs(2, position=blown), rules, TICK)
     place = state.trajectory.point
-    state, output = repeat(state, inputs(2, position=blown, references=(lost,)), rules, 3.0)
+    state, output = repeat(state, inputs(2, position=blown, references=[lost]), rules, 3.0)
     assert state.mode.mode is Mode.HOLD
     assert output.goal == place
     assert output.setpoint == pytest.approx(place)
-    assert Flag.REFERENCE_LOST in output.flags
+    assert Flag.REFERENCE_LOST in said(output)
     # Within its patience the reference is followed, however old.
     known = reference((-0.7, 0.0, 1.2), age=0.49, fresh=False)
-    state, output = step(state, inputs(2, references=(known,)), rules, TICK)
-    assert (state.mode.mode, Flag.REFERENCE_LOST in output.flags) == (Mode.FOLLOW, False)
+    state, output = step(state, inputs(2, references=[known]), rules, TICK)
+    assert (state.mode.mode, Flag.REFERENCE_LOST in said(output)) == (Mode.FOLLOW, False)
     assert output.goal == pytest.approx([-1.2, 0.5, 1.2])
 
 
@@ -173,13 +173,13 @@ def test_until_its_reference_has_joined_a_drone_holds_its_own_position(mode: Mod
 def test_a_silent_reference_is_extrapolated_within_its_bound(velocity: Triple, age: float, way: Triple) -> None:
     rules = settings(2)
     silent = reference(REST[1], velocity=vector(velocity), age=age, fresh=False)
-    _, output = step(hovering(2, rules), inputs(2, references=(silent,)), rules, TICK)
+    _, output = step(hovering(2, rules), inputs(2, references=[silent]), rules, TICK)
     assert np.subtract(output.goal, REST[2]) == pytest.approx(way)
-    assert output.flags == Flag.EXTRAPOLATING
+    assert said(output) == Flag.EXTRAPOLATING
     heard = replace(silent, fresh=True)
-    _, output = step(hovering(2, rules), inputs(2, references=(heard,)), rules, TICK)
+    _, output = step(hovering(2, rules), inputs(2, references=[heard]), rules, TICK)
     assert output.goal == pytest.approx(REST[2])
-    assert output.flags == Flag(0)
+    assert said(output) == Flag(0)
 
 
 @given(
@@ -190,7 +190,7 @@ def test_a_silent_reference_is_extrapolated_within_its_bound(velocity: Triple, a
 def test_no_silence_moves_a_goal_further_than_the_bound(velocity: Triple, age: float, law: str) -> None:
     rules = settings(2, f"swarm.law={law}", "formation.height_from=references")
     silent = reference(REST[1], velocity=vector(velocity), age=age, fresh=False)
-    _, output = step(hovering(2, rules), inputs(2, references=(silent,)), rules, TICK)
+    _, output = step(hovering(2, rules), inputs(2, references=[silent]), rules, TICK)
     assert math.dist(output.goal, REST[2]) <= EXTRAPOLATION + 1e-9
 
 
@@ -201,7 +201,7 @@ def test_a_silent_hand_no_longer_moves_anything(age: float, stale: bool) -> None
     assert state.mode.mode is Mode.FOLLOW
     assert state.hand is not None
     assert any(state.hand.velocity) != stale
-    assert (Flag.HAND_STALE in output.flags) is stale
+    assert (Flag.HAND_STALE in said(output)) is stale
 
 
 def test_a_silent_hand_is_no_longer_coming_closer() -> None:
@@ -268,7 +268,7 @@ def test_only_a_hand_that_wants_to_fly_is_taken_on(wish: Wish) -> None:
 
 def test_it_climbs_and_descends_at_its_rates_where_it_stands() -> None:
     rules = settings(2, "limits.takeoff_speed=0.4", "limits.landing_speed=0.2")
-    alone = {"references": (None,), "position": (-1.0, 0.5, 0.0)}
+    alone = {"references": [None], "position": (-1.0, 0.5, 0.0)}
     state = start((-1.0, 0.5, 0.0), rules, airborne=False)
     state, output = repeat(state, inputs(2, **alone), rules, 1.0)
     assert state.mode.mode is Mode.TAKEOFF
@@ -296,28 +296,28 @@ def test_blocked_is_said_after_two_seconds_of_not_arriving_and_no_longer_on_arri
     rules = settings(1)
     held = inputs(1, position=(-0.5, 0.35, 1.2))
     state, output = repeat(hovering(1, rules), held, rules, 1.9)
-    assert Flag.BLOCKED not in output.flags
+    assert Flag.BLOCKED not in said(output)
     state, output = repeat(state, held, rules, 0.2)
-    assert Flag.BLOCKED in output.flags
+    assert Flag.BLOCKED in said(output)
     state, output = step(state, inputs(1, position=(-0.5, 0.25, 1.2)), rules, TICK)
-    assert Flag.BLOCKED not in output.flags
+    assert Flag.BLOCKED not in said(output)
     _, output = repeat(state, held, rules, 1.9)
-    assert Flag.BLOCKED not in output.flags
+    assert Flag.BLOCKED not in said(output)
 
 
 def test_who_holds_is_not_blocked() -> None:
     rules = settings(1)
     held = inputs(1, position=(-0.5, 0.5, 1.2), wish=Wish.HOLD)
-    assert Flag.BLOCKED not in repeat(hovering(1, rules), held, rules, 3.0)[1].flags
+    assert Flag.BLOCKED not in said(repeat(hovering(1, rules), held, rules, 3.0)[1])
 
 
 def test_the_fence_is_reported_and_kept() -> None:
     rules = settings(2, "fence.min=[-1.2, -1.0, -0.1]", "fence.max=[1.0, 1.0, 3.0]")
-    outside = inputs(2, references=(reference((-1.5, 0.0, 1.2)),))
+    outside = inputs(2, references=[reference((-1.5, 0.0, 1.2))])
     _, output = repeat(hovering(2, rules), outside, rules, 3.0)
     assert output.goal == pytest.approx([-2.0, 0.5, 1.2])
     assert output.setpoint == pytest.approx([-1.05, 0.5, 1.2])
-    assert output.flags & Flag.FENCE
+    assert said(output) & Flag.FENCE
 
 
 @pytest.mark.parametrize(
@@ -326,7 +326,7 @@ def test_the_fence_is_reported_and_kept() -> None:
 def test_who_comes_near_is_avoided(near: dict[str, Any]) -> None:
     rules = settings(1)
     _, output = step(hovering(1, rules), inputs(1, **near), rules, TICK)
-    assert output.flags == Flag.AVOIDING
+    assert said(output) == Flag.AVOIDING
     assert math.dist(output.setpoint, REST[1]) > 1e-3
 
 
@@ -366,6 +366,7 @@ def test_a_relay_that_lost_its_hand_leaves_the_formation_where_it_is() -> None:
     assert published.mode is Mode.HOLD
 
 
+coordinates = st.floats(-2.0, 2.0)
 places = st.tuples(*[st.floats(-1_000.0, 1_000.0)] * 3) | st.tuples(*[st.floats(-2.0, 2.0)] * 3)
 speeds = st.tuples(*[st.floats(-50.0, 50.0)] * 3)
 ages = st.sampled_from([0.0, 0.0, 0.1, 0.3, 0.6, 1.5, 11.0])
@@ -394,8 +395,9 @@ moments = st.fixed_dictionaries(
         "wish": st.sampled_from([Wish.FLY, Wish.FLY, Wish.FLY, Wish.HOLD, Wish.LAND, Wish.STOP]),
         "hand_age": ages,
         "hand_fresh": st.booleans(),
-        "references": st.tuples(references, references, references),
+        "references": st.lists(references, min_size=3, max_size=3),
         "drones": st.lists(places, max_size=3).map(lambda found: drones(*found)),
+        "silent": st.lists(st.builds(Bystander, coordinates, coordinates, st.floats(0.35, 0.6)), max_size=2),
     }
 )
 stays = st.tuples(moments, st.sampled_from([1e-9, 0.008, TICK, 0.1, 30.0]), st.integers(1, 4))

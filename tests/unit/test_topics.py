@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.control.modes import HAND_STALE
-from agents.control.single.repair import REFERENCE_LOST
+from agents.control.repair import REFERENCE_LOST
 from shared.config import load_scenario
 from shared.errors import DecodeError
 from shared.scenario import Rates

@@ -2,13 +2,14 @@
 
 import json
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
 
-from agents.vehicles.bodies.fleet import park_fleet
+from agents.vehicles.bodies.fleet import BODIES, park_fleet, pose_of
 from agents.vehicles.bodies.state import Command
 from agents.vehicles.link import Verb, decode_pose, encode_order
 from agents.vehicles.world.faults import faults_of
@@ -31,7 +32,7 @@ IDS = (1, 2)
 
 @pytest.fixture
 def radio() -> Iterator[Radio]:
-    with Radio(("127.0.0.1", 0), IDS, np.array([False, True])) as made:
+    with Radio(("127.0.0.1", 0), IDS, {2}) as made:
         yield made
 
 
@@ -43,12 +44,10 @@ def driver(radio: Radio) -> Iterator[socket.socket]:
         yield made
 
 
-def make_world(radio: Radio) -> World:
-    fleet = park_fleet({1: "identified", 2: "crazyflie"}, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
-    rules = Rules(
-        ids=IDS, columns=np.zeros((0, 2)), column_radius=0.1, fence=(np.full(3, -9.0), np.full(3, 9.0))
-    )
-    return World(fleet, radio, rules, 10.0)
+def make_world(radio: Radio, failing: Mapping[int, VehicleSettings] = MappingProxyType({})) -> World:
+    fleet = park_fleet({1: "identified", 2: "crazyflie"}, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    rules = Rules(ids=IDS, columns=(), column_radius=0.1, fence=((-9.0, -9.0, -9.0), (9.0, 9.0, 9.0)))
+    return World(fleet, radio, rules, 10.0, {drone: faults_of(each) for drone, each in failing.items()})
 
 
 def test_garbage_is_counted_and_changes_nothing(radio: Radio, driver: socket.socket) -> None:
@@ -60,7 +59,7 @@ def test_garbage_is_counted_and_changes_nothing(radio: Radio, driver: socket.soc
         driver.send(datagram)
     radio.receive(10.1)
     assert radio.rejected == {"malformed": 3, "version": 1, "unknown-drone": 1}
-    assert radio.commands(10.1).kind.tolist() == [Command.FLY, Command.CUT]
+    assert [radio.command(drone, 10.1)[0] for drone in IDS] == [Command.FLY, Command.CUT]
 
 
 def test_newest_command_wins_and_ages(radio: Radio, driver: socket.socket) -> None:
@@ -68,9 +67,9 @@ def test_newest_command_wins_and_ages(radio: Radio, driver: socket.socket) -> No
         driver.send(encode_order(drone, Verb.FLY, (0.0, 0.0, 1.0)))
         driver.send(encode_order(drone, Verb.FLY, (0.5, 0.0, 1.0)))
     radio.receive(10.0)
-    assert radio.commands(10.0).setpoint.tolist() == [[0.5, 0.0, 1.0], [0.5, 0.0, 1.0]]
-    assert radio.commands(10.6).kind.tolist() == [Command.LEVEL, Command.FLY]
-    assert radio.commands(12.1).kind.tolist() == [Command.CUT, Command.FLY]
+    assert [radio.command(drone, 10.0)[1] for drone in IDS] == [(0.5, 0.0, 1.0)] * 2
+    assert [radio.command(drone, 10.6)[0] for drone in IDS] == [Command.LEVEL, Command.FLY]
+    assert [radio.command(drone, 12.1)[0] for drone in IDS] == [Command.CUT, Command.FLY]
 
 
 def test_hello_is_no_command(radio: Radio, driver: socket.socket) -> None:
@@ -78,7 +77,7 @@ def test_hello_is_no_command(radio: Radio, driver: socket.socket) -> None:
     radio.receive(10.0)
     driver.send(encode_order(2, Verb.HELLO))
     radio.receive(10.1)
-    assert radio.commands(10.1).kind[1] == Command.FLY
+    assert radio.command(2, 10.1)[0] == Command.FLY
 
 
 def test_poses_go_to_whoever_spoke_last(radio: Radio, driver: socket.socket) -> None:
@@ -116,7 +115,7 @@ def test_time_beyond_the_catch_up_is_given_up(radio: Radio) -> None:
 
 def test_a_taken_address_says_what_to_do(radio: Radio) -> None:
     with pytest.raises(DeviceError, match="another world may be running"):
-        Radio(("127.0.0.1", radio.port), IDS, np.array([False, True]))
+        Radio(("127.0.0.1", radio.port), IDS, {2})
 
 
 def test_plan_parks_the_formation_at_home() -> None:
@@ -130,17 +129,15 @@ def test_plan_parks_the_formation_at_home() -> None:
         "test",
     )
     setup = plan_world(scenario)
-    assert setup.fleet.ids == (1, 2, 3, 4)
+    assert list(setup.fleet) == [1, 2, 3, 4]
     assert setup.address == ("127.0.0.1", 7400)
-    assert setup.hovers.all()
-    assert setup.rules.columns.tolist() == [[5.0, 6.0]]
+    assert setup.hovers == {1, 2, 3, 4}
+    assert setup.rules.columns == ((5.0, 6.0),)
     expected = setup.formation.rest[:, :2] + np.array([1.0, 2.0])
-    assert setup.fleet.position[:, :2].tolist() == expected.tolist()
-    assert not setup.fleet.position[:, 2].any()
-    assert {group.body: group.rows.tolist() for group in setup.fleet.groups} == {
-        "identified": [0, 1, 3],
-        "crazyflie": [2],
-    }
+    places = [flyer.body.position for flyer in setup.fleet.values()]
+    assert places == [(x, y, 0.0) for x, y in expected.tolist()]
+    moved_by = {drone: flyer.model for drone, flyer in setup.fleet.items()}
+    assert moved_by == {drone: BODIES["crazyflie" if drone == 3 else "identified"] for drone in (1, 2, 3, 4)}
 
 
 @pytest.mark.parametrize(
@@ -162,12 +159,12 @@ def test_hand_watch_keeps_the_newest_valid_position() -> None:
     watch = HandWatch(MemoryBus(network), lambda: 0)
     publish: Callable[[bytes], None] = MemoryBus(network).publisher(HAND)
     assert watch.position() is None
-    for seq, x in enumerate((1.0, 2.0)):
+    for seq, x in enumerate((1.0, 1.2)):
         publish(encode(_hand(seq, x)))
     publish(b"\xc1")
     position = watch.position()
     assert position is not None
-    assert position.tolist() == [2.0, 0.0, 1.2]
+    assert position == (1.2, 0.0, 1.2)
     assert watch.rejected == {"malformed": 1}
 
 
@@ -197,31 +194,35 @@ def _hand(seq: int, x: float) -> HandSample:
 
 
 def test_injected_faults_drain_the_battery_and_keep_poses_back() -> None:
-    kinds = [
-        VehicleSettings(battery=0.5, endurance=10.0),
-        VehicleSettings(pose_silence=(2.0, 1.5)),
-    ]
-    faults = faults_of(kinds)
-    assert faults.left(np.array([2.0, 2.0])) == pytest.approx([0.3, 1.0])
-    assert faults.left(np.array([60.0, 60.0])) == pytest.approx([0.0, 1.0])
-    assert [faults.mute(t).tolist() for t in (0.0, 2.0, 3.4, 3.5)] == [
-        [False, False],
-        [False, True],
-        [False, True],
-        [False, False],
-    ]
+    draining = faults_of(VehicleSettings(battery=0.5, endurance=10.0))
+    silent = faults_of(VehicleSettings(pose_silence=(2.0, 1.5)))
+    assert [draining.left(t) for t in (2.0, 60.0)] == pytest.approx([0.3, 0.0])
+    assert [silent.left(t) for t in (2.0, 60.0)] == [1.0, 1.0]
+    assert [silent.mute(t) for t in (0.0, 2.0, 3.4, 3.5)] == [False, True, True, False]
+    assert not any(draining.mute(t) for t in (0.0, 2.0, 3.4, 3.5))
 
 
 def test_a_mute_vehicle_sends_no_pose_and_an_old_battery_shows_in_the_others(
     radio: Radio, driver: socket.socket
 ) -> None:
-    fleet = park_fleet({1: "identified", 2: "identified"}, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    world = make_world(radio, {1: VehicleSettings(pose_silence=(0.0, 9.0)), 2: VehicleSettings(battery=0.25)})
     for drone in IDS:
         driver.send(encode_order(drone, Verb.HELLO))
-    radio.receive(10.0)
-    radio.send(fleet, np.array([1.0, 0.25]), np.array([True, False]), 7)
+    world.run_until(10.0 + TICK)
     drone, pose = decode_pose(driver.recv(256))
-    assert (drone, pose.battery, pose.seq) == (2, 0.25, 7)
+    assert (drone, pose.battery) == (2, 0.25)
+    driver.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        driver.recv(256)
+
+
+def test_only_who_has_spoken_gets_poses(radio: Radio, driver: socket.socket) -> None:
+    driver.send(encode_order(2, Verb.HELLO))
+    radio.receive(10.0)
+    fleet = park_fleet({1: "identified", 2: "identified"}, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    radio.send({drone: pose_of(flyer, 1.0, 7) for drone, flyer in fleet.items()})
+    drone, pose = decode_pose(driver.recv(256))
+    assert (drone, pose.seq) == (2, 7)
     driver.setblocking(False)
     with pytest.raises(BlockingIOError):
         driver.recv(256)

@@ -1,1 +1,1 @@
-"""Simulated bodies: pure, vectorised over drones, explicit state (DESIGN section 7)."""
+"""Simulated bodies, one at a time: pure, explicit state (DESIGN section 7); written as `agents.control` is."""

@@ -4,41 +4,58 @@ Horizontally `a = g tan(tilt)`, with the tilt following its command as a second-
 """
 
 import math
+from typing import Final, final
 
-import numpy as np
+from agents.control.vectors import Planar, Vector
+from agents.vehicles.bodies.airframe import DRAG, GRAVITY, MOTOR_LAG, move, thrust_of
+from agents.vehicles.bodies.pid import LIFT, PERIOD, ROUNDING, TILT, open_loop
+from agents.vehicles.bodies.state import FLY, Body, Model
 
-from agents.vehicles.bodies.airframe import DRAG, GRAVITY, move
-from agents.vehicles.bodies.pid import ALL_AXES, control
-from agents.vehicles.bodies.state import BodyState, Commands
-
-ATTITUDE_BANDWIDTH = 12.0
+ATTITUDE_BANDWIDTH: Final = 12.0
 """Natural frequency of the critically damped attitude, rad/s."""
 
 
-def step(state: BodyState, commands: Commands, dt: float) -> BodyState:
-    """Advances N Crazyflies by one substep.
+@final
+class Crazyflie(Model):
+    """See the module."""
 
-    Args:
-        state: N bodies.
-        commands: One per body.
-        dt: Substep, s, at most the controller's 0.02.
+    def fly(self, body: Body, kind: int, setpoint: Vector, dt: float, substeps: int) -> Body:
+        """See `Model.fly`."""
+        x, y, z = body.position
+        u, v, w = body.velocity
+        thrust, wait = body.thrust, body.wait
+        a, b, c = body.integral
+        ex, ey, ez = body.error
+        pitch, roll, pwm = body.output
+        p, q = body.tilt
+        p_rate, q_rate = body.tilt_rate
+        sx, sy, sz = setpoint
+        flying = kind == FLY
+        steady, lag = thrust_of(pwm), math.exp(-dt / MOTOR_LAG)
+        decay = math.exp(-ATTITUDE_BANDWIDTH * dt)
+        for _ in range(substeps):
+            grounded = z <= 0.0
+            if wait <= ROUNDING:
+                still = open_loop(kind, pwm, grounded=grounded)
+                a, ex, pitch = TILT.tick(sx - x, a, ex, 0.0, flying=flying, grounded=grounded)
+                b, ey, roll = TILT.tick(sy - y, b, ey, 0.0, flying=flying, grounded=grounded)
+                c, ez, pwm = LIFT.tick(sz - z, c, ez, still, flying=flying, grounded=grounded)
+                steady = thrust_of(pwm)
+                wait += PERIOD
+            wait -= dt
+            p1, p_rate = _follow(p, p_rate, 0.0 if grounded else math.radians(pitch), dt, decay)
+            q1, q_rate = _follow(q, q_rate, 0.0 if grounded else math.radians(roll), dt, decay)
+            along_x = GRAVITY * math.tan(0.5 * (p + p1)) - DRAG * u
+            along_y = GRAVITY * math.tan(0.5 * (q + q1)) - DRAG * v
+            later = steady + (thrust - steady) * lag
+            x, y, z, u, v, w = move((x, y, z, u, v, w), along_x, along_y, 0.5 * (thrust + later), dt)
+            p, q, thrust = p1, q1, later
+        error, output, tilt, tilt_rate = (ex, ey, ez), (pitch, roll, pwm), (p, q), (p_rate, q_rate)
+        return Body((x, y, z), (u, v, w), (a, b, c), error, output, tilt, tilt_rate, thrust, wait)
 
-    Returns:
-        The bodies `dt` later.
-    """
-    tilted = _follow_attitude(control(state, commands, ALL_AXES, dt), dt)
-    acceleration = GRAVITY * np.tan(0.5 * (state.tilt + tilted.tilt)) - DRAG * state.velocity[:, :2]
-    return move(tilted, acceleration, dt)
 
-
-def _follow_attitude(state: BodyState, dt: float) -> BodyState:
-    """Exact step of `x'' + 2 w x' + w^2 x = w^2 u` with u held; level on the ground."""
-    w = ATTITUDE_BANDWIDTH
-    command = np.radians(state.output[:, :2])
-    command[state.grounded] = 0.0
-    offset = state.tilt - command
-    slope = state.tilt_rate + w * offset
-    decay = math.exp(-w * dt)
-    tilt = command + (offset + slope * dt) * decay
-    tilt_rate = (state.tilt_rate - w * slope * dt) * decay
-    return state._replace(tilt=tilt, tilt_rate=tilt_rate)
+def _follow(tilt: float, rate: float, command: float, dt: float, decay: float) -> Planar:
+    """Returns tilt and its rate after an exact step of `x'' + 2 w x' + w^2 x = w^2 u` with u held."""
+    offset = tilt - command
+    slope = rate + ATTITUDE_BANDWIDTH * offset
+    return (command + (offset + slope * dt) * decay, (rate - ATTITUDE_BANDWIDTH * slope * dt) * decay)

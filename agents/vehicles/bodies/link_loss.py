@@ -1,26 +1,23 @@
 """What a vehicle does on its own when its commands stop coming: a pure function of their age."""
 
-from agents.vehicles.bodies.state import Command, Kinds, Mask, Vec
+from typing import Final
 
-LEVEL_AFTER = 0.5
-CUT_AFTER = 2.0
+from agents.vehicles.bodies.state import CUT, LEVEL
+
+LEVEL_AFTER: Final = 0.5
+CUT_AFTER: Final = 2.0
 """Ages at which the Crazyflie firmware levels and cuts, s (research: crazyflie commander)."""
 
 
-def apply_link_loss(kind: Kinds, age: Vec, hovers: Mask) -> Kinds:
-    """Replaces the commands of vehicles that have lost their link.
+def obeyed(kind: int, age: float, *, hovers: bool) -> int:
+    """Returns the `Command` that a vehicle obeys now.
 
     Args:
-        kind: (N,) last `Command` that each vehicle got.
-        age: (N,) time since then, s; infinite if there never was one.
-        hovers: (N,) vehicles that hold their last command for ever (rule `hover`); the others follow the
-            Crazyflie firmware (rule `crazyflie`).
-
-    Returns:
-        (N,) the `Command` that each vehicle obeys now.
+        kind: Last `Command` that it got.
+        age: Time since then, s; infinite if there never was one.
+        hovers: Whether it holds its last command for ever (rule `hover`) or follows the Crazyflie firmware
+            (rule `crazyflie`).
     """
-    lost = ~hovers & (kind != Command.CUT.value)
-    obeyed = kind.copy()
-    obeyed[lost & (age >= LEVEL_AFTER)] = Command.LEVEL
-    obeyed[lost & (age >= CUT_AFTER)] = Command.CUT
-    return obeyed
+    if hovers or kind == CUT or age < LEVEL_AFTER:
+        return kind
+    return CUT if age >= CUT_AFTER else LEVEL

@@ -1,16 +1,12 @@
-"""What a simulated body is (state) and what it can be told (commands), for N bodies at once."""
+"""What a simulated body is (its state), what it can be told (commands), and what moves it (a model)."""
 
 import enum
-from typing import NamedTuple
+import math
+from typing import Final, final
 
-import numpy as np
-import numpy.typing as npt
+from agents.control.vectors import ORIGIN, Planar, Vector
 
-Vec = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
-Kinds = npt.NDArray[np.int8]
-
-AIRBORNE_HEIGHT = 0.03
+AIRBORNE_HEIGHT: Final = 0.03
 """A body higher than this counts as airborne, m."""
 
 
@@ -29,77 +25,98 @@ class Command(enum.IntEnum):
     """Motors off at any height."""
 
 
-class Commands(NamedTuple):
-    """One command per body.
+# Python compares members of an enumeration several times slower than their values.
+FLY: Final[int] = Command.FLY.value
+LEVEL: Final[int] = Command.LEVEL.value
+DESCEND: Final[int] = Command.DESCEND.value
+IDLE: Final[int] = Command.IDLE.value
+CUT: Final[int] = Command.CUT.value
+
+
+@final
+class Body:
+    """State of one body.
 
     Attributes:
-        kind: (N,) values of `Command`.
-        setpoint: (N, 3) world frame, m; read where kind is FLY, finite everywhere.
-    """
-
-    kind: Kinds
-    setpoint: Vec
-
-    @property
-    def flying(self) -> Mask:
-        """(N, 1) which bodies fly to their set-point."""
-        return self.says(Command.FLY)[:, None]
-
-    def says(self, command: Command) -> Mask:
-        """(N,) which bodies got this command."""
-        # numpy compares with an enum member five times slower than with its value.
-        told: Mask = self.kind == command.value
-        return told
-
-
-class BodyState(NamedTuple):
-    """State of N bodies.
-
-    Attributes:
-        position: (N, 3) world frame, m.
-        velocity: (N, 3) world frame, m/s.
-        integral: (N, 3) integral of the position error, m s.
-        error: (N, 3) position error at the last controller tick, m; NaN: it was not flying then.
-        output: (N, 3) controller output: tilt towards +x and +y, deg, and motor command, PWM.
-        tilt: (N, 2) tilt towards +x and +y, rad.
-        tilt_rate: (N, 2) rad/s.
-        thrust: (N,) N.
+        position: World frame, m.
+        velocity: World frame, m/s.
+        integral: Integral of the position error, m s.
+        error: Position error at the last controller tick, m; NaN: it was not flying then.
+        output: Controller output: tilt towards +x and +y, deg, and motor command, PWM.
+        tilt: Towards +x and +y, rad.
+        tilt_rate: rad/s.
+        thrust: N.
         wait: Time to the next controller tick, s.
     """
 
-    position: Vec
-    velocity: Vec
-    integral: Vec
-    error: Vec
-    output: Vec
-    tilt: Vec
-    tilt_rate: Vec
-    thrust: Vec
-    wait: float
-
-    @property
-    def grounded(self) -> Mask:
-        """(N,) which bodies touch the ground."""
-        return self.position[:, 2] <= 0.0
-
-
-def at_rest(positions: Vec) -> BodyState:
-    """Places bodies at rest with motors off.
-
-    Args:
-        positions: (N, 3) world frame, m; heights below the ground are raised to it.
-    """
-    n = len(positions)
-    position = np.array(positions, dtype=np.float64)
-    position[:, 2] = np.maximum(position[:, 2], 0.0)
-    return BodyState(
-        position=position,
-        velocity=np.zeros((n, 3)),
-        integral=np.zeros((n, 3)),
-        error=np.full((n, 3), np.nan),
-        output=np.zeros((n, 3)),
-        tilt=np.zeros((n, 2)),
-        tilt_rate=np.zeros((n, 2)),
-        thrust=np.zeros(n),
-        wait=0.0,
+    __slots__ = (
+        "error",
+        "integral",
+        "output",
+        "position",
+        "thrust",
+        "tilt",
+        "tilt_rate",
+        "velocity",
+        "wait",
     )
+
+    def __init__(
+        self,
+        position: Vector,
+        velocity: Vector,
+        integral: Vector,
+        error: Vector,
+        output: Vector,
+        tilt: Planar,
+        tilt_rate: Planar,
+        thrust: float,
+        wait: float,
+    ) -> None:
+        self.position: Final = position
+        self.velocity: Final = velocity
+        self.integral: Final = integral
+        self.error: Final = error
+        self.output: Final = output
+        self.tilt: Final = tilt
+        self.tilt_rate: Final = tilt_rate
+        self.thrust: Final = thrust
+        self.wait: Final = wait
+
+    def moved(self, position: Vector, velocity: Vector) -> "Body":
+        """Returns the same body elsewhere, or at another speed."""
+        return Body(
+            position,
+            velocity,
+            self.integral,
+            self.error,
+            self.output,
+            self.tilt,
+            self.tilt_rate,
+            self.thrust,
+            self.wait,
+        )
+
+
+class Model:
+    """The equations of motion of one type of body."""
+
+    def fly(self, body: Body, kind: int, setpoint: Vector, dt: float, substeps: int) -> Body:
+        """Advances a body with its command held.
+
+        Args:
+            body: Before.
+            kind: Value of a `Command`.
+            setpoint: World frame, m; read where kind is FLY, finite always.
+            dt: Substep, s, at most the controller's 0.02.
+            substeps: How many.
+        """
+        raise NotImplementedError
+
+
+def at_rest(position: Vector) -> Body:
+    """Places a body at rest with motors off; a height below the ground is raised to it, m."""
+    x, y, z = position
+    unknown = (math.nan, math.nan, math.nan)
+    level = (0.0, 0.0)
+    return Body((x, y, max(z, 0.0)), ORIGIN, ORIGIN, unknown, ORIGIN, level, level, 0.0, 0.0)

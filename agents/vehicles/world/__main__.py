@@ -33,7 +33,7 @@ def main() -> int:
     try:
         scenario, _ = open_scenario(arguments.scenario, arguments.set)
         setup = plan_world(scenario)
-        radio = Radio(setup.address, setup.fleet.ids, setup.hovers)
+        radio = Radio(setup.address, setup.fleet, setup.hovers)
         verify = hand_verifier(scenario.net)
         bus = join(scenario, setup.formation, WORLD, audited=True)
     except SwarmTouchError as error:

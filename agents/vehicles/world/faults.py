@@ -1,47 +1,46 @@
-"""Faults that a scenario injects into simulated vehicles: batteries that drain, poses that stay away."""
+"""Faults that a scenario injects into a simulated vehicle: a battery that drains, poses that stay away."""
 
-import numpy as np
-from attrs import field, frozen
+import math
 
-from agents.vehicles.bodies.state import Mask, Vec
+from attrs import frozen
+
 from shared.scenario import VehicleSettings
 
 
 @frozen(kw_only=True)
 class Faults:
-    """One row per simulated drone.
+    """Of one vehicle.
 
     Attributes:
-        charge: (N,) charge at the start, 0..1.
-        endurance: (N,) flying time from full to empty, s; infinite for a battery that never drains.
-        mute_from: (N,) when the pose stops coming, s from the start of the world; infinite for never.
-        mute_until: (N,) when it comes again, s.
+        charge: At the start, 0..1.
+        endurance: Flying time from full to empty, s; infinite for a battery that never drains.
+        mute_from: When the pose stops coming, s from the start of the world; infinite for never.
+        mute_until: When it comes again, s.
     """
 
-    charge: Vec = field(eq=False)
-    endurance: Vec = field(eq=False)
-    mute_from: Vec = field(eq=False)
-    mute_until: Vec = field(eq=False)
+    charge: float
+    endurance: float
+    mute_from: float
+    mute_until: float
 
-    def left(self, flown: Vec) -> Vec:
-        """Returns the charges (N,), 0..1.
+    def left(self, flown: float) -> float:
+        """Returns the charge, 0..1, after some time in the air, s."""
+        return min(max(self.charge - flown / self.endurance, 0.0), 1.0)
 
-        Args:
-            flown: (N,) time in the air so far, s.
-        """
-        return np.clip(self.charge - flown / self.endurance, 0.0, 1.0)
-
-    def mute(self, t: float) -> Mask:
-        """Returns whose pose does not come at a time (s from the start)."""
-        return (self.mute_from <= t) & (t < self.mute_until)
+    def mute(self, t: float) -> bool:
+        """Says whether the pose stays away at a time (s from the start)."""
+        return self.mute_from <= t < self.mute_until
 
 
-def faults_of(settings: list[VehicleSettings]) -> Faults:
-    """Returns the faults of some vehicles; what a scenario does not name does not fail."""
-    silence = np.array([s.pose_silence or (np.inf, 0.0) for s in settings]).reshape(-1, 2)
+def faults_of(settings: VehicleSettings) -> Faults:
+    """Returns the faults of a vehicle; what a scenario does not name does not fail."""
+    start, length = settings.pose_silence or (math.inf, 0.0)
     return Faults(
-        charge=np.array([1.0 if s.battery is None else s.battery for s in settings]),
-        endurance=np.array([np.inf if s.endurance is None else s.endurance for s in settings]),
-        mute_from=silence[:, 0],
-        mute_until=silence.sum(axis=1),
+        charge=1.0 if settings.battery is None else settings.battery,
+        endurance=math.inf if settings.endurance is None else settings.endurance,
+        mute_from=start,
+        mute_until=start + length,
     )
+
+
+NO_FAULTS = faults_of(VehicleSettings())

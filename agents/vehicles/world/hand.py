@@ -2,10 +2,8 @@
 
 from collections import Counter
 
-import numpy as np
-
-from agents.vehicles.bodies.state import Vec
 from shared.clock import Clock
+from shared.messages import Vector
 from shared.senses import Senses
 from shared.signature import Verify
 from shared.transport import Bus, Inbox
@@ -31,8 +29,8 @@ class HandWatch:
         """Refused payloads by reason."""
         return self._senses.rejected
 
-    def position(self) -> Vec | None:
-        """Returns the newest position (3,) in the world frame, m; None before the first."""
+    def position(self) -> Vector | None:
+        """Returns the newest position in the world frame, m; None before the first."""
         self._senses.take(self._inbox.take())
         hand = self._senses.hand
-        return None if hand is None else np.array(hand.message.position)
+        return None if hand is None else hand.message.position

@@ -1,27 +1,32 @@
 """The vehicles' links as the world sees them: the newest command per drone in, poses out, over UDP."""
 
+import math
 import socket
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Container, Iterable, Mapping
 from typing import Self
 
-import numpy as np
+from msgspec import Struct
 
-from agents.vehicles.bodies.fleet import Fleet, poses
-from agents.vehicles.bodies.link_loss import apply_link_loss
-from agents.vehicles.bodies.state import Command, Commands, Mask, Vec
+from agents.vehicles.base import Pose
+from agents.vehicles.bodies.link_loss import obeyed
+from agents.vehicles.bodies.state import CUT, DESCEND, FLY, IDLE
 from agents.vehicles.link import MAX_DATAGRAM, Order, Verb, decode_order, encode_pose
 from shared.errors import DecodeError, DeviceError
+from shared.messages import ORIGIN, Vector
 
 MAX_PER_CALL = 1024
 """Datagrams looked at per call: a flood of garbage costs commands, never the world's clock."""
 
-COMMAND_OF = {
-    Verb.FLY: Command.FLY,
-    Verb.DESCEND: Command.DESCEND,
-    Verb.IDLE: Command.IDLE,
-    Verb.STOP: Command.CUT,
-}
+COMMAND_OF = {Verb.FLY: FLY, Verb.DESCEND: DESCEND, Verb.IDLE: IDLE, Verb.STOP: CUT}
+
+
+class Told(Struct, frozen=True):
+    """The last command of one vehicle: value of a `Command`, set-point, m, and when it came, monotonic, s."""
+
+    kind: int = CUT
+    setpoint: Vector = ORIGIN
+    at: float = -math.inf
 
 
 class Radio:
@@ -31,8 +36,8 @@ class Radio:
 
     Args:
         address: Host and port to listen on; port 0 takes a free one.
-        ids: Numbers of the drones, one per row.
-        hovers: (N,) rows that follow the link-loss rule `hover`, the others `crazyflie`.
+        ids: Numbers of the drones.
+        hovers: Those that follow the link-loss rule `hover`, the others `crazyflie`.
 
     Attributes:
         rejected: Refused datagrams by reason.
@@ -41,12 +46,9 @@ class Radio:
         DeviceError: The address cannot be listened on.
     """
 
-    def __init__(self, address: tuple[str, int], ids: Sequence[int], hovers: Mask) -> None:
-        self._row = {drone: row for row, drone in enumerate(ids)}
+    def __init__(self, address: tuple[str, int], ids: Iterable[int], hovers: Container[int]) -> None:
         self._hovers = hovers
-        self._kind = np.full(len(ids), Command.CUT, dtype=np.int8)
-        self._setpoint = np.zeros((len(ids), 3))
-        self._commanded = np.full(len(ids), -np.inf)
+        self._told = {drone: Told() for drone in ids}
         self._drivers: dict[int, tuple[str, int]] = {}
         self.rejected: Counter[str] = Counter()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -82,27 +84,18 @@ class Radio:
             except DecodeError as error:
                 self.rejected[error.reason] += 1
 
-    def commands(self, now: float) -> Commands:
-        """Returns what each vehicle obeys now, its link-loss rule applied."""
-        kind = apply_link_loss(self._kind, now - self._commanded, self._hovers)
-        return Commands(kind, self._setpoint)
+    def command(self, drone: int, now: float) -> tuple[int, Vector]:
+        """Returns what a vehicle obeys now, its link-loss rule applied: value of a `Command`, set-point, m."""
+        told = self._told[drone]
+        return obeyed(told.kind, now - told.at, hovers=drone in self._hovers), told.setpoint
 
-    def send(self, fleet: Fleet, charge: Vec, mute: Mask, seq: int) -> None:
-        """Sends every drone's pose to its driver.
-
-        Args:
-            fleet: The bodies now.
-            charge: (N,) of their batteries, 0..1.
-            mute: (N,) whose pose does not come.
-            seq: Number of this report.
-        """
-        reports, silent = poses(fleet, charge.tolist(), seq), mute.tolist()
+    def send(self, reports: Mapping[int, Pose]) -> None:
+        """Sends poses of drones to their drivers."""
         for drone, driver in self._drivers.items():
-            row = self._row[drone]
-            if silent[row]:
+            if drone not in reports:
                 continue
             try:
-                self._socket.sendto(encode_pose(drone, reports[row]), driver)
+                self._socket.sendto(encode_pose(drone, reports[drone]), driver)
             except OSError:
                 self.rejected["unsent"] += 1
 
@@ -117,11 +110,8 @@ class Radio:
         self.close()
 
     def _obey(self, order: Order, sender: tuple[str, int], now: float) -> None:
-        row = self._row.get(order.drone)
-        if row is None:
+        if order.drone not in self._told:
             raise DecodeError("unknown-drone", str(order.drone))
         self._drivers[order.drone] = sender
         if order.verb is not Verb.HELLO:
-            self._kind[row] = COMMAND_OF[order.verb]
-            self._setpoint[row] = order.setpoint
-            self._commanded[row] = now
+            self._told[order.drone] = Told(COMMAND_OF[order.verb], order.setpoint, now)

@@ -4,33 +4,39 @@ Only bodies in the air count: a pair counts if at least one of the two is airbor
 counted once per episode.
 """
 
-import functools
 import math
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple, TypeVar
 
-import numpy as np
 from attrs import evolve, frozen
 
-from agents.vehicles.bodies.state import Mask, Vec
+from shared.cells import near_pairs
+from shared.messages import Vector
+from shared.scenario import Pair
+
+K = TypeVar("K", bound=tuple[int, ...])
+
+_FIRST_REACH = 1.0
+"""How far the first pair is looked for at first, m."""
 
 
-@frozen(kw_only=True, eq=False)
+@frozen(kw_only=True)
 class Rules:
     """What counts.
 
     Attributes:
-        ids: Numbers of the drones, one per row.
-        columns: (M, 2) axes of the vertical columns, m.
+        ids: Numbers of the drones.
+        columns: Axes of the vertical columns, m.
         column_radius: Radius of a column, m.
         body_radius: Half the contact distance of two bodies, m: a Crazyflie's arm (0.046) and its propeller.
-        fence: Lower and upper corner (3,) of the fence, m.
+        fence: Lower and upper corner of the fence, m.
     """
 
     ids: tuple[int, ...]
-    columns: Vec
+    columns: tuple[Pair, ...]
     column_radius: float
     body_radius: float = 0.06
-    fence: tuple[Vec, Vec]
+    fence: tuple[Vector, Vector]
 
 
 class Closest(NamedTuple):
@@ -42,9 +48,10 @@ class Closest(NamedTuple):
 
 
 NEVER = Closest()
+NOBODY: frozenset[tuple[int, int]] = frozenset()
 
 
-@frozen(kw_only=True, eq=False)
+@frozen(kw_only=True)
 class RefereeState:
     """What the referee has seen.
 
@@ -54,9 +61,9 @@ class RefereeState:
         drone_contacts: Contacts between drones.
         column_contacts: Contacts with columns.
         fence_exits: Exits from the fence.
-        touching: (N, N) pairs in contact at the last update, upper triangle.
-        grazing: (N, M) drones in contact with columns at the last update.
-        outside: (N,) drones outside the fence at the last update.
+        touching: Pairs of drones in contact at the last update.
+        grazing: Drones in contact with columns at the last update, and with which.
+        outside: Drones outside the fence at the last update.
     """
 
     pair: Closest = NEVER
@@ -64,50 +71,45 @@ class RefereeState:
     drone_contacts: int = 0
     column_contacts: int = 0
     fence_exits: int = 0
-    touching: Mask
-    grazing: Mask
-    outside: Mask
-
-
-def start_referee(rules: Rules) -> RefereeState:
-    """Returns the state before the first update."""
-    n = len(rules.ids)
-    return RefereeState(
-        touching=np.zeros((n, n), dtype=bool),
-        grazing=np.zeros((n, len(rules.columns)), dtype=bool),
-        outside=np.zeros(n, dtype=bool),
-    )
+    touching: frozenset[tuple[int, int]] = NOBODY
+    grazing: frozenset[tuple[int, int]] = NOBODY
+    outside: frozenset[int] = frozenset()
 
 
 def update(
-    rules: Rules, state: RefereeState, positions: Vec, airborne: Mask, *, hand: Vec | None, t: float
+    rules: Rules,
+    state: RefereeState,
+    positions: Sequence[Vector],
+    airborne: Sequence[bool],
+    *,
+    hand: Vector | None,
+    t: float,
 ) -> RefereeState:
     """Looks at one instant.
 
     Args:
         rules: What counts.
         state: What was seen before.
-        positions: (N, 3) world frame, m.
-        airborne: (N,) which bodies are clear of the ground.
-        hand: (3,) the hand in the world frame, m; None if unknown.
+        positions: Of the drones in the order of the rules, world frame, m.
+        airborne: Which bodies are clear of the ground.
+        hand: The hand in the world frame, m; None if unknown.
         t: Time, s.
     """
-    if not airborne.any():
-        calm = start_referee(rules)
-        return evolve(state, touching=calm.touching, grazing=calm.grazing, outside=calm.outside)
-    gaps = _pair_gaps(positions, airborne)
-    touching = gaps < 2.0 * rules.body_radius
-    grazing = airborne[:, None] & (
-        _column_gaps(positions, rules.columns) < rules.column_radius + rules.body_radius
-    )
-    low, high = rules.fence
-    outside = airborne & ((positions < low) | (positions > high)).any(axis=1)
+    if not any(airborne):
+        return evolve(state, touching=NOBODY, grazing=NOBODY, outside=frozenset())
+    contact = 2.0 * rules.body_radius
+    gaps = _gaps(rules, positions, airborne, max(contact, state.pair.distance))
+    touching = frozenset(pair for pair, gap in gaps.items() if gap < contact)
+    flying = [(rules.ids[k], positions[k]) for k in range(len(rules.ids)) if airborne[k]]
+    grazing = frozenset(_grazing(rules, flying))
+    outside = frozenset(drone for drone, position in flying if _is_outside(position, rules.fence))
+    to_hand = {} if hand is None else {(drone,): math.dist(position, hand) for drone, position in flying}
     return RefereeState(
-        pair=_nearest(state.pair, gaps, rules.ids, t),
-        hand=_nearest(state.hand, _hand_gaps(positions, airborne, hand), rules.ids, t),
-        drone_contacts=state.drone_contacts + _begun(state.touching, touching),
-        column_contacts=state.column_contacts + _begun(state.grazing, grazing),
-        fence_exits=state.fence_exits + _begun(state.outside, outside),
+        pair=_nearest(state.pair, gaps, t),
+        hand=_nearest(state.hand, to_hand, t),
+        drone_contacts=state.drone_contacts + len(touching - state.touching),
+        column_contacts=state.column_contacts + len(grazing - state.grazing),
+        fence_exits=state.fence_exits + len(outside - state.outside),
         touching=touching,
         grazing=grazing,
         outside=outside,
@@ -135,42 +137,47 @@ def report(state: RefereeState) -> dict[str, float]:
     return numbers
 
 
-def _pair_gaps(positions: Vec, airborne: Mask) -> Vec:
-    """(N, N) distances of the pairs that count, infinite elsewhere; upper triangle."""
-    offsets = positions[:, None] - positions[None]
-    gaps: Vec = np.sqrt(np.einsum("ijk,ijk->ij", offsets, offsets))
-    gaps[_counted_already(len(positions)) | ~(airborne[:, None] | airborne)] = np.inf
-    return gaps
+def _gaps(
+    rules: Rules, positions: Sequence[Vector], airborne: Sequence[bool], reach: float
+) -> dict[tuple[int, int], float]:
+    """Returns the distances of the pairs that count, at least of those within reach."""
+    if math.isinf(reach):
+        return _first_gaps(rules, positions, airborne)
+    pairs = near_pairs([(x, y) for x, y, _ in positions], reach)
+    return {
+        (rules.ids[one], rules.ids[other]): math.dist(positions[one], positions[other])
+        for one, other in pairs
+        if airborne[one] or airborne[other]
+    }
 
 
-@functools.cache
-def _counted_already(n: int) -> Mask:
-    """(N, N) lower triangle and diagonal: pairs that the upper one has."""
-    return np.tri(n, dtype=bool)
+def _first_gaps(
+    rules: Rules, positions: Sequence[Vector], airborne: Sequence[bool]
+) -> dict[tuple[int, int], float]:
+    """Returns the distances of the pairs that count, the nearest among them, looking farther and farther."""
+    low, high = ([extreme(axis) for axis in zip(*positions, strict=True)] for extreme in (min, max))
+    reach = _FIRST_REACH
+    while True:
+        gaps = _gaps(rules, positions, airborne, reach)
+        if reach > math.dist(low, high) or any(gap <= reach for gap in gaps.values()):
+            return gaps
+        reach *= 2.0
 
 
-def _column_gaps(positions: Vec, columns: Vec) -> Vec:
-    """(N, M) horizontal distances from the columns' axes."""
-    offsets = positions[:, None, :2] - columns[None]
-    gaps: Vec = np.sqrt(np.einsum("ijk,ijk->ij", offsets, offsets))
-    return gaps
+def _grazing(rules: Rules, flying: Iterable[tuple[int, Vector]]) -> Iterable[tuple[int, int]]:
+    touch = rules.column_radius + rules.body_radius
+    for drone, (x, y, _) in flying:
+        for column, (cx, cy) in enumerate(rules.columns):
+            if math.hypot(x - cx, y - cy) < touch:
+                yield drone, column
 
 
-def _hand_gaps(positions: Vec, airborne: Mask, hand: Vec | None) -> Vec:
-    """(N,) distances from the hand, infinite where they do not count."""
-    if hand is None:
-        return np.full(len(positions), np.inf)
-    offsets = positions - hand
-    return np.where(airborne, np.sqrt(np.einsum("ij,ij->i", offsets, offsets)), np.inf)
+def _is_outside(position: Vector, fence: tuple[Vector, Vector]) -> bool:
+    return any(not low <= p <= high for p, low, high in zip(position, *fence, strict=True))
 
 
-def _nearest(before: Closest, gaps: Vec, ids: tuple[int, ...], t: float) -> Closest:
-    distance = float(gaps.min())
-    if distance < before.distance:
-        where = np.unravel_index(np.argmin(gaps), gaps.shape)
-        return Closest(distance, tuple(ids[row] for row in where), t)
-    return before
-
-
-def _begun(before: Mask, now: Mask) -> int:
-    return int(np.count_nonzero(now & ~before))
+def _nearest(before: Closest, gaps: Mapping[K, float], t: float) -> Closest:
+    if not gaps:
+        return before
+    drones = min(gaps, key=gaps.__getitem__)
+    return Closest(gaps[drones], drones, t) if gaps[drones] < before.distance else before

@@ -1,10 +1,11 @@
 """From a scenario to what a world consists of."""
 
-import numpy as np
+from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
+
 from attrs import frozen
 
 from agents.vehicles.bodies.fleet import Fleet, park_fleet
-from agents.vehicles.bodies.state import Mask, Vec
 from agents.vehicles.sim import parse_uri
 from agents.vehicles.world.faults import Faults, faults_of
 from agents.vehicles.world.referee import Rules
@@ -12,6 +13,7 @@ from shared.config import vehicle_settings
 from shared.errors import ConfigError
 from shared.fence import fence_box
 from shared.formation import Formation, build_formation
+from shared.messages import Vector
 from shared.scenario import Scenario
 
 
@@ -22,18 +24,18 @@ class Setup:
     Attributes:
         formation: The whole formation, drones with other vehicles included.
         fleet: Every simulated drone, parked below its place in the rest formation at home.
-        hovers: (N,) rows that follow the link-loss rule `hover`.
+        hovers: Drones that follow the link-loss rule `hover`.
         address: Host and port that their drivers expect.
         rules: What the referee counts.
-        faults: What the scenario makes fail.
+        faults: What the scenario makes fail, by drone.
     """
 
     formation: Formation
     fleet: Fleet
-    hovers: Mask
+    hovers: AbstractSet[int]
     address: tuple[str, int]
     rules: Rules
-    faults: Faults
+    faults: Mapping[int, Faults]
 
 
 def plan_world(scenario: Scenario) -> Setup:
@@ -47,33 +49,38 @@ def plan_world(scenario: Scenario) -> Setup:
     simulated = {drone: s for drone, s in settings.items() if str(s.uri).startswith("sim://")}
     fleet = park_fleet(
         {drone: str(s.body) for drone, s in simulated.items()},
-        _places(scenario, formation)[[formation.row(drone) for drone in simulated]],
+        [_place(scenario, formation, drone) for drone in simulated],
     )
     return Setup(
         formation=formation,
         fleet=fleet,
-        hovers=np.array([s.link_loss == "hover" for s in simulated.values()], dtype=bool),
+        hovers={drone for drone, s in simulated.items() if s.link_loss == "hover"},
         address=_address({drone: str(s.uri) for drone, s in simulated.items()}),
-        rules=referee_rules(scenario, formation, fleet.ids),
-        faults=faults_of(list(simulated.values())),
+        rules=referee_rules(scenario, formation, tuple(fleet)),
+        faults={drone: faults_of(s) for drone, s in simulated.items()},
     )
 
 
 def referee_rules(scenario: Scenario, formation: Formation, ids: tuple[int, ...]) -> Rules:
     """Returns what the referee counts for some drones of a scenario."""
+    low, high = fence_box(scenario, formation)
     return Rules(
         ids=ids,
-        columns=np.array([(o.x, o.y) for o in scenario.obstacles], dtype=np.float64).reshape(-1, 2),
+        columns=tuple((o.x, o.y) for o in scenario.obstacles),
         column_radius=scenario.avoidance.columns.radius,
-        fence=fence_box(scenario, formation),
+        fence=(_corner(low.tolist()), _corner(high.tolist())),
     )
 
 
-def _places(scenario: Scenario, formation: Formation) -> Vec:
-    """(N, 3) places on the ground below the rest formation at home."""
-    places = np.zeros_like(formation.rest)
-    places[:, :2] = formation.rest[:, :2] + scenario.hand.home
-    return places
+def _place(scenario: Scenario, formation: Formation, drone: int) -> Vector:
+    """Returns the place on the ground below a drone's in the rest formation at home, m."""
+    (x, y, _), (home_x, home_y) = formation.rest[formation.row(drone)].tolist(), scenario.hand.home
+    return (x + home_x, y + home_y, 0.0)
+
+
+def _corner(numbers: list[float]) -> Vector:
+    x, y, z = numbers
+    return (x, y, z)
 
 
 def _address(uris: dict[int, str]) -> tuple[str, int]:

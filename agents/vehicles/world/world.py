@@ -1,13 +1,12 @@
 """The world's clock: takes commands, advances all bodies, tells their drivers and the referee."""
 
-import numpy as np
+from collections.abc import Mapping
 
-from agents.vehicles.bodies.fleet import Fleet, advance_fleet
-from agents.vehicles.bodies.state import Vec
-from agents.vehicles.world.faults import Faults, faults_of
+from agents.vehicles.bodies.fleet import Fleet, advance, pose_of
+from agents.vehicles.world.faults import NO_FAULTS, Faults
 from agents.vehicles.world.radio import Radio
-from agents.vehicles.world.referee import Rules, report, start_referee, update
-from shared.scenario import VehicleSettings
+from agents.vehicles.world.referee import RefereeState, Rules, report, update
+from shared.messages import Vector
 
 TICK = 0.01
 """Simulated time per tick, s: poses stream at 100 Hz, bodies step finer than that."""
@@ -24,7 +23,7 @@ class World:
         radio: Their links.
         rules: What the referee counts.
         now: Monotonic time of the start, s.
-        faults: What fails; None for nothing.
+        faults: What fails, by drone; who is not in it does not.
 
     Attributes:
         fleet: The bodies at the last tick.
@@ -33,16 +32,16 @@ class World:
     """
 
     def __init__(
-        self, fleet: Fleet, radio: Radio, rules: Rules, now: float, faults: Faults | None = None
+        self, fleet: Fleet, radio: Radio, rules: Rules, now: float, faults: Mapping[int, Faults] | None = None
     ) -> None:
-        self.fleet = fleet
+        self.fleet = dict(fleet)
         self.ticks = 0
         self.lost_time = 0.0
         self._radio = radio
         self._rules = rules
-        self._faults = faults or faults_of([VehicleSettings()] * len(fleet.ids))
-        self._flown = np.zeros(len(fleet.ids))
-        self._referee = start_referee(rules)
+        self._faults = dict.fromkeys(fleet, NO_FAULTS) | dict(faults or {})
+        self._flown = dict.fromkeys(fleet, 0.0)
+        self._referee = RefereeState()
         self._start = self._next = now
         # Poses of a restarted world must not repeat the numbers of the one before.
         self._first_seq = int(now / TICK)
@@ -52,12 +51,12 @@ class World:
         """Monotonic time at which `run_until` has work, s."""
         return self._next + TICK
 
-    def run_until(self, now: float, hand: Vec | None = None) -> None:
+    def run_until(self, now: float, hand: Vector | None = None) -> None:
         """Makes every tick that is due.
 
         Args:
             now: Monotonic time, s.
-            hand: (3,) the hand in the world frame, m; None if unknown.
+            hand: The hand in the world frame, m; None if unknown.
         """
         self._radio.receive(now)
         behind = now - self._next - MAX_CATCH_UP * TICK
@@ -73,13 +72,19 @@ class World:
         """Returns the referee's numbers and the world's own."""
         return {**report(self._referee), "lost_time_s": self.lost_time}
 
-    def _tick(self, now: float, hand: Vec | None) -> None:
-        self.fleet = advance_fleet(self.fleet, self._radio.commands(now), TICK)
-        t = now - self._start
-        self._flown += TICK * self.fleet.airborne
-        charge, mute = self._faults.left(self._flown), self._faults.mute(t)
-        self._radio.send(self.fleet, charge, mute, self._first_seq + self.ticks)
-        self._referee = update(
-            self._rules, self._referee, self.fleet.position, self.fleet.airborne, hand=hand, t=t
-        )
+    def _tick(self, now: float, hand: Vector | None) -> None:
+        t, seq = now - self._start, self._first_seq + self.ticks
+        reports = {}
+        for drone, before in self.fleet.items():
+            kind, setpoint = self._radio.command(drone, now)
+            self.fleet[drone] = flyer = advance(before, kind, setpoint, TICK)
+            if flyer.airborne:
+                self._flown[drone] += TICK
+            faults = self._faults[drone]
+            if not faults.mute(t):
+                reports[drone] = pose_of(flyer, faults.left(self._flown[drone]), seq)
+        self._radio.send(reports)
+        flyers = self.fleet.values()
+        positions, airborne = [f.body.position for f in flyers], [f.airborne for f in flyers]
+        self._referee = update(self._rules, self._referee, positions, airborne, hand=hand, t=t)
         self.ticks += 1

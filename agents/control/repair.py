@@ -6,30 +6,26 @@ takes over, and gives back, step by step within a second; who returns has to be 
 """
 
 from collections.abc import Mapping, Sequence
-
-from attrs import frozen
-from msgspec import Struct
+from typing import Final, final
 
 from agents.control import modes
+from agents.control.goals import Guide, Row, goal_of
 from agents.control.hand import MappedHand
-from agents.control.single.goals import Guide, Row, goal_of
-from agents.control.single.impedance import AT_REST, LinkState, step_links
-from agents.control.single.vectors import Vector, norm
+from agents.control.impedance import AT_REST, LinkState, step_links
+from agents.control.vectors import Vector, norm
 from shared.messages import Mode
 
-REFERENCE_LOST = 0.5
+REFERENCE_LOST: Final = 0.5
 """A reference unheard for this long is lost, s."""
-EXTRAPOLATION = 0.25
+EXTRAPOLATION: Final = 0.25
 """A silent reference is extrapolated by at most this, m."""
-BLEND = 1.0
+BLEND: Final = 1.0
 """A stand-in takes over, and gives back, within this time, s."""
-RETURN_AFTER = 1.0
+RETURN_AFTER: Final = 1.0
 """A reference that is back is trusted after it has been heard for this long, s."""
-LEAVING_MODES = frozenset({Mode.LAND, Mode.STOP})
-"""A reference in one of these no longer shows where the formation goes."""
 
 
-@frozen(kw_only=True)
+@final
 class Kin:
     """One ancestor in the reference graph.
 
@@ -37,16 +33,18 @@ class Kin:
         drone: Its number.
         row: Its row of the formation.
         references: Its own references, as places in the tuple of kin.
-        heights: Rest heights of those above the hand, m; None uses their actual ones.
     """
 
-    drone: int
-    row: Row
-    references: tuple[int, ...]
-    heights: tuple[float, ...] | None
+    __slots__ = ("drone", "references", "row")
+
+    def __init__(self, drone: int, row: Row, references: tuple[int, ...]) -> None:
+        self.drone: Final = drone
+        self.row: Final = row
+        self.references: Final = references
 
 
-class Reference(Guide, frozen=True):
+@final
+class Reference(Guide):
     """An ancestor as last heard: its position (`paper`) or goal (`stable`), goal velocity and mode.
 
     Attributes:
@@ -55,12 +53,19 @@ class Reference(Guide, frozen=True):
         fresh: Whether the sample is newer than the one of the last step.
     """
 
-    velocity: Vector
-    age: float
-    fresh: bool
+    __slots__ = ("age", "fresh", "velocity")
+
+    def __init__(
+        self, point: Vector, goal_velocity: Vector, mode: Mode, velocity: Vector, age: float, *, fresh: bool
+    ) -> None:
+        super().__init__(point, goal_velocity, mode)
+        self.velocity: Final = velocity
+        self.age: Final = age
+        self.fresh: Final = fresh
 
 
-class StandIn(Struct, frozen=True):
+@final
+class StandIn:
     """How far an ancestor has been replaced.
 
     Attributes:
@@ -69,25 +74,31 @@ class StandIn(Struct, frozen=True):
         links: Its links, simulated while the stand-in has a share.
     """
 
-    share: float
-    heard_for: float
-    links: tuple[LinkState, ...]
+    __slots__ = ("heard_for", "links", "share")
+
+    def __init__(self, share: float, heard_for: float, links: tuple[LinkState, ...]) -> None:
+        self.share: Final = share
+        self.heard_for: Final = heard_for
+        self.links: Final = links
 
 
 def is_fit(reference: Reference | None) -> bool:
     """Says whether an ancestor is heard and part of the formation."""
-    return reference is not None and reference.age <= REFERENCE_LOST and reference.mode in modes.GUIDED_MODES
+    return reference is not None and reference.age <= REFERENCE_LOST and modes.is_guided(reference.mode)
 
 
 def is_gone(reference: Reference | None) -> bool:
     """Says whether an ancestor needs a stand-in."""
-    return reference is None or reference.age > REFERENCE_LOST or reference.mode in LEAVING_MODES
+    if reference is None or reference.age > REFERENCE_LOST:
+        return True
+    # It no longer shows where the formation goes.
+    return reference.mode is modes.LAND or reference.mode is modes.STOP
 
 
 def replace_lost(
-    stand_ins: Sequence[StandIn],
-    kin: Sequence[Kin],
-    heard: Sequence[Reference | None],
+    stand_ins: tuple[StandIn, ...],
+    kin: tuple[Kin, ...],
+    heard: list[Reference | None],
     hand_velocity: Vector,
     dt: float,
 ) -> tuple[StandIn, ...]:
@@ -100,16 +111,15 @@ def replace_lost(
         hand_velocity: Mapped hand velocity in the formation's frame, m/s.
         dt: Time since the last step, s.
     """
-    before = stand_ins or [_absent(each) for each in kin]
-    after = tuple(
-        [
-            _advance(stand_in, each, reference, hand_velocity, dt)
-            if stand_in.share > 0.0 or is_gone(reference)
-            else stand_in
-            for stand_in, each, reference in zip(before, kin, heard, strict=True)
-        ]
-    )
-    return after if any(each.share for each in after) else ()
+    after = []
+    replaced = False
+    for place, each in enumerate(kin):
+        stand_in = stand_ins[place] if stand_ins else _absent(each)
+        if stand_in.share > 0.0 or is_gone(heard[place]):
+            stand_in = _advance(stand_in, each, heard[place], hand_velocity, dt)
+            replaced = replaced or stand_in.share > 0.0
+        after.append(stand_in)
+    return tuple(after) if replaced else ()
 
 
 def _absent(kin: Kin) -> StandIn:
@@ -133,9 +143,9 @@ def _advance(
 
 
 def guides(
-    stand_ins: Sequence[StandIn],
-    kin: Sequence[Kin],
-    heard: Sequence[Reference | None],
+    stand_ins: tuple[StandIn, ...],
+    kin: tuple[Kin, ...],
+    heard: list[Reference | None],
     wanted: int,
     hand: MappedHand,
 ) -> list[Guide | None]:
@@ -157,9 +167,9 @@ def guides(
 
 def _guide(
     place: int,
-    stand_ins: Sequence[StandIn],
-    kin: Sequence[Kin],
-    heard: Sequence[Reference | None],
+    stand_ins: tuple[StandIn, ...],
+    kin: tuple[Kin, ...],
+    heard: list[Reference | None],
     hand: MappedHand,
     known: dict[int, Guide | None],
 ) -> Guide | None:
@@ -171,6 +181,11 @@ def _guide(
             own = _blend(own, _stand_in(kin[place], stand_ins[place].links, behind, hand), share)
         known[place] = own
     return known[place]
+
+
+def all_follow(lead: list[Guide]) -> bool:
+    """Says whether everybody whom a drone follows is in FOLLOW."""
+    return all(guide.mode is modes.FOLLOW for guide in lead)
 
 
 def guide_of(reference: Reference | None) -> Guide | None:
@@ -185,15 +200,14 @@ def _own(reference: Reference) -> Guide:
 
 
 def _stand_in(
-    kin: Kin, links: tuple[LinkState, ...], behind: Sequence[Guide | None], hand: MappedHand
+    kin: Kin, links: tuple[LinkState, ...], behind: list[Guide | None], hand: MappedHand
 ) -> Guide | None:
     """Returns the goal of an ancestor by its own row, None if one of its references has not joined yet."""
     present = [guide for guide in behind if guide is not None]
     if len(present) < len(behind):
         return None
-    point, velocity = goal_of(kin.row, links, hand, present, kin.heights)
-    follows = all(guide.mode is Mode.FOLLOW for guide in present)
-    return Guide(point, velocity, Mode.FOLLOW if follows else Mode.HOLD)
+    point, velocity = goal_of(kin.row, links, hand, present)
+    return Guide(point, velocity, modes.FOLLOW if all_follow(present) else modes.HOLD)
 
 
 def _blend(own: Guide | None, stand_in: Guide | None, share: float) -> Guide | None:
@@ -207,7 +221,8 @@ def _blend(own: Guide | None, stand_in: Guide | None, share: float) -> Guide | N
 
 
 def _between(a: Vector, b: Vector, share: float) -> Vector:
-    (x, y, z), (u, v, w) = a, b
+    x, y, z = a
+    u, v, w = b
     return (x + share * (u - x), y + share * (v - y), z + share * (w - z))
 
 
@@ -215,7 +230,8 @@ def _extrapolated(reference: Reference) -> Vector:
     """Returns where a silent reference would be by now, at most 0.25 m from where it was last."""
     speed = norm(reference.velocity)
     seconds = min(reference.age, EXTRAPOLATION / speed) if speed > 0.0 else 0.0
-    (x, y, z), (u, v, w) = reference.point, reference.velocity
+    x, y, z = reference.point
+    u, v, w = reference.velocity
     return (x + u * seconds, y + v * seconds, z + w * seconds)
 
 

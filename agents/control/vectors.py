@@ -1,34 +1,34 @@
 """Vectors in the world or the formation's frame as tuples of floats."""
 
 import math
-from collections.abc import Iterable
 
 from shared.messages import ORIGIN, Vector
 
-__all__ = ["ORIGIN", "Planar", "Vector", "clamp", "norm", "rotate", "shorten", "vector"]
+__all__ = ["ORIGIN", "Planar", "Vector", "clamp", "distance", "norm", "rotate", "shorten"]
 
 Planar = tuple[float, float]
 """Horizontal part of a vector."""
 
 
-def vector(numbers: Iterable[float]) -> Vector:
-    """Makes a vector of any three numbers, such as a row of an array."""
-    x, y, z = map(float, numbers)
-    return (x, y, z)
-
-
 def norm(vector: Vector) -> float:
     """Returns the length."""
     x, y, z = vector
-    return math.hypot(x, y, z)
+    return math.sqrt(x * x + y * y + z * z)
+
+
+def distance(one: Vector, other: Vector) -> float:
+    """Returns how far two points are apart."""
+    x, y, z = one
+    a, b, c = other
+    return norm((a - x, b - y, c - z))
 
 
 def shorten(vector: Vector, largest: float) -> Vector:
     """Shortens a vector to at most `largest`."""
-    x, y, z = vector
-    length = math.hypot(x, y, z)
+    length = norm(vector)
     if length <= largest:
         return vector
+    x, y, z = vector
     share = largest / length
     return (x * share, y * share, z * share)
 
@@ -36,7 +36,8 @@ def shorten(vector: Vector, largest: float) -> Vector:
 def clamp(vector: Vector, low: Vector, high: Vector) -> Vector:
     """Returns the nearest point of the box from `low` to `high`."""
     x, y, z = vector
-    (x0, y0, z0), (x1, y1, z1) = low, high
+    x0, y0, z0 = low
+    x1, y1, z1 = high
     return (
         x0 if x < x0 else x1 if x > x1 else x,
         y0 if y < y0 else y1 if y > y1 else y,
