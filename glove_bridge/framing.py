@@ -15,7 +15,7 @@ from cobs import cobs
 from glove_bridge.protocol import MAX_FRAMES, MOTORS, Message
 from shared.errors import DecodeError
 
-MAX_PACKET = 2 + (2 + MOTORS) * MAX_FRAMES + 2
+MAX_PACKET = 2 + 2 + (2 + MOTORS) * MAX_FRAMES + 2
 """Longest frame before COBS, bytes: below 254, so COBS adds exactly one byte."""
 
 _CRC_START = 0xFFFF
@@ -54,12 +54,15 @@ def decode(frame: bytes) -> Message:
 class StreamDecoder:
     """Finds the messages in a stream of bytes, whatever else is in it.
 
+    Args:
+        rejected: Where to count, a counter of its own by default.
+
     Attributes:
         rejected: How many frames were none, by the reason of `decode` or `oversized`.
     """
 
-    def __init__(self) -> None:
-        self.rejected: Counter[str] = Counter()
+    def __init__(self, rejected: Counter[str] | None = None) -> None:
+        self.rejected: Counter[str] = Counter() if rejected is None else rejected
         self._frame = bytearray()
 
     def feed(self, data: bytes) -> list[Message]:

@@ -19,6 +19,9 @@ LONGEST_WAIT = 0.05
 REST = 0.004
 """Shortest time between two steps, s: the states of one tick of the swarm are worth few steps, not one each."""
 
+GLOVE_THERE = "glove_there"
+"""Metric of the bridge's status: 1 while patterns can be felt, else 0."""
+
 _STATE_PERIOD_NS = round(NS_PER_S / FORMATION_STATE.rate_hz)
 _log = logging.getLogger("bridge")
 
@@ -90,10 +93,10 @@ def run(bridge: Bridge, glove: Glove, bus: Bus, inbox: Inbox, clock: Clock, stop
         if sentence != told:
             told = sentence
             _log.info("%s: %s", word, sentence)
-        status.tick(bridge.steps, word, bridge.senses.rejected, lambda: metrics(bridge))
+        status.tick(bridge.steps, word, rejected(bridge, glove), lambda: metrics(bridge, glove))
         stopping.wait(REST)
         inbox.wait(patience(glove, clock()))
-    status.tick(bridge.steps, "ending", bridge.senses.rejected, lambda: metrics(bridge), force=True)
+    status.tick(bridge.steps, "ending", rejected(bridge, glove), lambda: metrics(bridge, glove), force=True)
 
 
 def act(glove: Glove, step: Step, now_ns: int) -> None:
@@ -112,15 +115,20 @@ def health(bridge: Bridge, glove: Glove) -> tuple[str, str]:
     elif bridge.missing:
         faults.append(f"not heard: drone {', '.join(map(str, bridge.missing))}")
     if not glove.connected:
-        faults.append("no glove")
+        faults.append(f"no glove: {glove.fault}")
     word = "starting" if not bridge.senses.drones else "degraded" if faults else "running"
     return word, "; ".join(faults) or "every drone is heard, the glove is ready"
 
 
-def metrics(bridge: Bridge) -> dict[str, float]:
-    """Returns the numbers for the status: pattern events by outcome, and how many drones are missing."""
+def rejected(bridge: Bridge, glove: Glove) -> dict[str, int]:
+    """Returns what was dropped, by reason: messages of the swarm, and what the glove has said."""
+    return {**bridge.senses.rejected, **{f"glove-{reason}": n for reason, n in glove.rejected.copy().items()}}
+
+
+def metrics(bridge: Bridge, glove: Glove) -> dict[str, float]:
+    """Returns the numbers for the status: events by outcome, missing drones, whether patterns can be felt."""
     counts = {f"patterns_{outcome}": float(bridge.counts[outcome]) for outcome in Outcome}
-    return {**counts, "missing": float(len(bridge.missing))}
+    return {**counts, "missing": float(len(bridge.missing)), GLOVE_THERE: float(glove.connected)}
 
 
 def patience(glove: Glove, now_ns: int) -> float:

@@ -4,9 +4,10 @@ Host to chip: HELLO, SET, PLAY, STOP, PING; back: ACK, and HELLO's reply. `docs/
 byte, and `firmware/swarmtouch_glove.h` is the other end. Integers are big-endian.
 
 HELLO opens a session under a nonce that the host draws; the same nonce again is answered and changes nothing.
-The dead-man ends it: no valid frame for that long. Outside a session every motor is off and only HELLO is
-obeyed. Each command has its own seq, counted up from HELLO's modulo 256; a retry repeats it. The chip obeys
-what is 1 to 127 ahead of the newest seq it knows, and only answers the rest: DUPLICATE or STALE.
+Everything else names its session by that nonce. The dead-man ends a session: nothing obeyed for that long.
+Outside a session every motor is off and only HELLO is obeyed. Each command has its own seq, counted up from
+HELLO's modulo 256; a retry repeats it. The chip obeys what is 1 to 127 ahead of the newest seq it knows, and
+only answers the rest: DUPLICATE or STALE.
 """
 
 import enum
@@ -16,7 +17,7 @@ from typing import ClassVar, Self
 from attrs import field, frozen
 from attrs.validators import and_, deep_iterable, ge, le, max_len, min_len
 
-PROTOCOL = 1
+PROTOCOL = 2
 """Version of the messages; a chip with another one opens no session."""
 MOTORS = 5
 MAX_FRAMES = 32
@@ -29,6 +30,7 @@ USB_BAUD, XBEE_BAUD = 115_200, 57_600
 HELD = 0xFFFF
 """`Ack.remaining_ms` while a SET is held."""
 _FRAME = struct.Struct(f">H{MOTORS}B")
+_SESSION = struct.Struct(">H")
 
 
 class Status(enum.IntEnum):
@@ -38,7 +40,7 @@ class Status(enum.IntEnum):
     DUPLICATE = 1
     """It has this one already, and did nothing again."""
     NO_SESSION = 2
-    """It was reset or the dead-man ended the session: say HELLO."""
+    """The command is of no session, or of another one: a reset, the dead-man or a new HELLO has ended it."""
     STALE = 3
     """It knows a newer command."""
     BAD_BODY = 4
@@ -80,27 +82,55 @@ class Hello:
 
 
 @frozen
-class Set:
-    """Sets every motor now and holds it, for as long as the session lives.
+class _InSession:
+    """What belongs to a session: every command but HELLO, and its acknowledgement.
 
     Attributes:
         seq: Number of the command.
+        session: Nonce of the session.
+    """
+
+    seq: int = field(validator=_U8)
+    session: int = field(default=0, validator=_U16, kw_only=True)
+
+    def body(self) -> bytes:
+        """Returns the bytes after type and seq."""
+        return _SESSION.pack(self.session) + self._rest()
+
+    @classmethod
+    def parse(cls, seq: int, body: bytes) -> Self:
+        """Reads `body`; raises ValueError or struct.error."""
+        (session,) = _SESSION.unpack_from(body)
+        return cls._parse_rest(seq, session, body[_SESSION.size :])
+
+    def _rest(self) -> bytes:
+        return b""
+
+    @classmethod
+    def _parse_rest(cls, seq: int, session: int, rest: bytes) -> Self:
+        if rest:
+            raise ValueError(f"{len(rest)} bytes too many")
+        return cls(seq, session=session)
+
+
+@frozen
+class Set(_InSession):
+    """Sets every motor now and holds it, for as long as the session lives.
+
+    Attributes:
         duties: PWM duty of finger 1 (thumb) .. 5 (little), 0 (off) to 255.
     """
 
     TYPE: ClassVar = 0x02
 
-    seq: int = field(validator=_U8)
     duties: tuple[int, ...] = field(validator=[deep_iterable(_U8), min_len(MOTORS), max_len(MOTORS)])
 
-    def body(self) -> bytes:
-        """Returns the bytes after type and seq."""
+    def _rest(self) -> bytes:
         return bytes(self.duties)
 
     @classmethod
-    def parse(cls, seq: int, body: bytes) -> Self:
-        """Reads `body`; raises ValueError."""
-        return cls(seq, tuple(body))
+    def _parse_rest(cls, seq: int, session: int, rest: bytes) -> Self:
+        return cls(seq, tuple(rest), session=session)
 
 
 @frozen
@@ -117,17 +147,15 @@ class PlayFrame:
 
 
 @frozen
-class Play:
+class Play(_InSession):
     """Plays a whole pattern from now on, instead of whatever plays.
 
     Attributes:
-        seq: Number of the command.
         frames: Steps, one after the other without gaps; 1 to `MAX_FRAMES`, `MAX_PATTERN_MS` in all.
     """
 
     TYPE: ClassVar = 0x03
 
-    seq: int = field(validator=_U8)
     frames: tuple[PlayFrame, ...]
 
     def __attrs_post_init__(self) -> None:
@@ -141,54 +169,34 @@ class Play:
         """Length of the whole pattern, ms."""
         return sum(frame.ms for frame in self.frames)
 
-    def body(self) -> bytes:
-        """Returns the bytes after type and seq."""
+    def _rest(self) -> bytes:
         return b"".join(_FRAME.pack(frame.ms, *frame.duties) for frame in self.frames)
 
     @classmethod
-    def parse(cls, seq: int, body: bytes) -> Self:
-        """Reads `body`; raises ValueError or struct.error."""
-        return cls(seq, tuple(PlayFrame(ms, tuple(duties)) for ms, *duties in _FRAME.iter_unpack(body)))
+    def _parse_rest(cls, seq: int, session: int, rest: bytes) -> Self:
+        frames = tuple(PlayFrame(ms, tuple(duties)) for ms, *duties in _FRAME.iter_unpack(rest))
+        return cls(seq, frames, session=session)
 
 
 @frozen
-class _Bare:
-    """A command without a body."""
-
-    seq: int = field(validator=_U8)
-
-    def body(self) -> bytes:
-        """Returns the bytes after type and seq: none."""
-        return b""
-
-    @classmethod
-    def parse(cls, seq: int, body: bytes) -> Self:
-        """Reads `body`; raises ValueError."""
-        if body:
-            raise ValueError(f"{len(body)} bytes too many")
-        return cls(seq)
-
-
-@frozen
-class Stop(_Bare):
+class Stop(_InSession):
     """Every motor off at once; the session lives on."""
 
     TYPE: ClassVar = 0x04
 
 
 @frozen
-class Ping(_Bare):
+class Ping(_InSession):
     """Keeps the session alive."""
 
     TYPE: ClassVar = 0x05
 
 
 @frozen
-class Ack:
-    """What the chip did with a command.
+class Ack(_InSession):
+    """What the chip did with a command; seq and session are that command's.
 
     Attributes:
-        seq: Number of that command.
         status: What it did.
         remaining_ms: Length of what is still to play; 0 when the motors rest, `HELD` while a SET is held.
         rejected: Frames that did not arrive whole since the chip's reset, modulo 65536.
@@ -197,20 +205,16 @@ class Ack:
     TYPE: ClassVar = 0x80
     _BODY: ClassVar = struct.Struct(">BHH")
 
-    seq: int = field(validator=_U8)
     status: Status = field(converter=Status)
     remaining_ms: int = field(validator=_U16)
     rejected: int = field(validator=_U16)
 
-    def body(self) -> bytes:
-        """Returns the bytes after type and seq."""
+    def _rest(self) -> bytes:
         return self._BODY.pack(self.status, self.remaining_ms, self.rejected)
 
     @classmethod
-    def parse(cls, seq: int, body: bytes) -> Self:
-        """Reads `body`; raises ValueError or struct.error."""
-        status, remaining_ms, rejected = cls._BODY.unpack(body)
-        return cls(seq, status, remaining_ms, rejected)
+    def _parse_rest(cls, seq: int, session: int, rest: bytes) -> Self:
+        return cls(seq, *cls._BODY.unpack(rest), session=session)
 
 
 @frozen

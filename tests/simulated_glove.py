@@ -29,6 +29,7 @@ from glove_bridge.protocol import (
     PlayFrame,
     Set,
     Status,
+    Stop,
 )
 
 OFF = (0,) * MOTORS
@@ -50,7 +51,7 @@ class Device:
         self._protocol = protocol
         self._nonce: int | None = None
         self._seq = 0
-        self._deadman_ns = self._heard_ns = 0
+        self._deadman_ns = self._obeyed_ns = 0
         self._frames: tuple[PlayFrame, ...] = ()
         self._started_ns = 0
         self._held = OFF
@@ -62,40 +63,44 @@ class Device:
 
     def tick(self, now_ns: int) -> None:
         """Moves on: dead-man and frames."""
-        if self._nonce is not None and now_ns - self._heard_ns > self._deadman_ns:
+        if self._nonce is not None and now_ns - self._obeyed_ns >= self._deadman_ns:
             self._nonce = None
             self._rest()
         self._drive(now_ns)
 
     def answer(self, command: Command, now_ns: int) -> HelloReply | Ack:
         """Obeys a command."""
-        reply = self._greet(command) if isinstance(command, Hello) else self._acknowledge(command, now_ns)
-        if self._nonce is not None:
-            self._heard_ns = now_ns
+        if isinstance(command, Hello):
+            reply: HelloReply | Ack = self._greet(command, now_ns)
+        else:
+            reply = self._acknowledge(command, now_ns)
         self._drive(now_ns)
         return reply
 
-    def _acknowledge(self, command: Command, now_ns: int) -> Ack:
+    def _acknowledge(self, command: Set | Play | Stop | Ping, now_ns: int) -> Ack:
         status = self._obey(command, now_ns)
-        return Ack(command.seq, status, self._remaining_ms(now_ns), 0)
+        if status is Status.OK:
+            self._obeyed_ns = now_ns
+        return Ack(command.seq, status, self._remaining_ms(now_ns), 0, session=command.session)
 
-    def _greet(self, hello: Hello) -> HelloReply:
+    def _greet(self, hello: Hello, now_ns: int) -> HelloReply:
         if hello.protocol == self._protocol and hello.nonce != self._nonce:
             self._nonce, self._seq, self._deadman_ns = hello.nonce, hello.seq, hello.deadman_ms * MS
+            self._obeyed_ns = now_ns
             self._rest()
         return HelloReply(
             seq=hello.seq,
             protocol=self._protocol,
             firmware=(0, 9),
-            nonce=hello.nonce,
+            nonce=self._nonce or 0,
             motors=MOTORS,
             max_frames=MAX_FRAMES,
             max_pattern_ms=MAX_PATTERN_MS,
             deadman_ms=hello.deadman_ms,
         )
 
-    def _obey(self, command: Command, now_ns: int) -> Status:
-        if self._nonce is None:
+    def _obey(self, command: Set | Play | Stop | Ping, now_ns: int) -> Status:
+        if self._nonce is None or command.session != self._nonce:
             return Status.NO_SESSION
         ahead = (command.seq - self._seq) % 256
         if not 1 <= ahead <= 127:

@@ -1,5 +1,7 @@
 """`none://`: no glove. The state of the formation is still published, and every pattern fails."""
 
+from collections import Counter
+
 from glove_bridge.gloves.base import Outcome, Report
 from glove_bridge.patterns.pattern import Pattern
 from shared.uri import Uri
@@ -9,11 +11,13 @@ class AbsentGlove:
     """A glove that is not there; see `Glove`."""
 
     connected = False
+    fault = "none was chosen"
 
     def __init__(self, uri: Uri) -> None:
         """Takes a URI without options."""
         uri.refuse_unknown()
         self._reports: list[Report] = []
+        self.rejected: Counter[str] = Counter()
 
     def play(self, pattern: Pattern, now_ns: int) -> None:  # noqa: ARG002  interface
         """See `Glove.play`."""

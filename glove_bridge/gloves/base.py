@@ -1,6 +1,7 @@
 """What a glove is to the bridge: it takes whole patterns and reports how they went."""
 
 import enum
+from collections import Counter
 from typing import NamedTuple, Protocol
 
 from glove_bridge.patterns.pattern import Pattern
@@ -17,6 +18,11 @@ class Outcome(enum.StrEnum):
     """It did not start, or was cut short."""
 
 
+LONGEST_WAIT_S = 3.0
+CLOSED = "closed"
+"""The fault of a glove that was closed."""
+
+
 class Report(NamedTuple):
     """One step in the life of the pattern that was given last; at most `STARTED`, then one of the others.
 
@@ -30,11 +36,24 @@ class Report(NamedTuple):
 
 
 class Glove(Protocol):
-    """Five vibrating fingertips. No call blocks, and none raises because the device is out of reach."""
+    """Five vibrating fingertips. No call blocks, and none raises because the device is out of reach.
+
+    Whatever the device does, a pattern ends: `LONGEST_WAIT_S` after its length at the latest.
+    """
 
     @property
     def connected(self) -> bool:
         """Whether patterns can be felt."""
+        ...
+
+    @property
+    def fault(self) -> str:
+        """Why they cannot, for people; empty while they can."""
+        ...
+
+    @property
+    def rejected(self) -> Counter[str]:
+        """What the device has said that was dropped, by reason."""
         ...
 
     def play(self, pattern: Pattern, now_ns: int) -> None:

@@ -8,6 +8,7 @@ import io
 import json
 import logging
 
+from glove_bridge.gloves.base import CLOSED
 from glove_bridge.gloves.timed import TimedGlove
 from glove_bridge.patterns.pattern import Frame, Pattern
 from glove_bridge.patterns.schema import FINGERS
@@ -39,16 +40,9 @@ class RecordGlove(TimedGlove):
         except OSError as error:
             raise ConfigError(f"record://{path}: cannot be written: {error}; choose another file") from error
 
-    @property
-    def connected(self) -> bool:
-        """See `Glove.connected`."""
-        return self._file is not None
-
     def close(self) -> None:
         """See `Glove.close`."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        self._end(CLOSED)
 
     def _show(self, pattern: Pattern | None, frame: Frame | None, now_ns: int) -> None:
         if self._file is None:
@@ -65,4 +59,9 @@ class RecordGlove(TimedGlove):
             self._file.write(f"{json.dumps(line)}\n".encode())
         except OSError as error:
             _log.warning("cannot write %s any more: %s; no patterns are recorded", self._file.name, error)
-            self.close()
+            self._end(f"cannot write {self._file.name}: {error}")
+
+    def _end(self, fault: str) -> None:
+        if self._file is not None:
+            self._file.close()
+            self._file, self.fault = None, fault

@@ -3,6 +3,7 @@
 It only keeps the time: every pattern starts at once and ends when its frames have passed.
 """
 
+from glove_bridge.gloves.base import CLOSED
 from glove_bridge.gloves.timed import TimedGlove
 from glove_bridge.patterns.pattern import Frame, Pattern
 from shared.uri import Uri
@@ -19,16 +20,10 @@ class ScreenGlove(TimedGlove):
         super().__init__()
         if uri is not None:
             uri.refuse_unknown()
-        self._open = True
-
-    @property
-    def connected(self) -> bool:
-        """See `Glove.connected`."""
-        return self._open
 
     def close(self) -> None:
         """See `Glove.close`."""
-        self._open = False
+        self.fault = CLOSED
 
     def _show(self, pattern: Pattern | None, frame: Frame | None, now_ns: int) -> None:
         """Whoever watches the pattern events shows them."""

@@ -4,15 +4,18 @@
 """
 
 import time
+from collections import Counter
 
 import attrs
 
 from glove_bridge.calibration import device_frames
 from glove_bridge.calibration_file import load_calibration
-from glove_bridge.gloves.base import Outcome, Report
+from glove_bridge.gloves.base import CLOSED, Outcome, Report
 from glove_bridge.gloves.serial_link import SerialLink
+from glove_bridge.link_timing import USB, XBEE, LinkTiming
 from glove_bridge.patterns.pattern import Pattern
-from glove_bridge.session import USB, XBEE, LinkTiming, Session
+from glove_bridge.session import Session
+from shared.clock import NS_PER_S
 from shared.errors import ConfigError
 from shared.uri import Uri
 
@@ -21,12 +24,19 @@ _LINKS = {"usb": USB, "xbee": XBEE}
 _POLL_NS = 2_000_000
 """How soon to poll again while the device has something to say."""
 
+FRESH_NS = 500_000_000
+"""A pattern that the line's thread finds later than this is not played any more: it would be about the past."""
+OVERDUE_NS = 2 * NS_PER_S
+"""A pattern that has not ended so long after its length never will: the thread of the line hangs."""
+
 
 class SerialGlove:
     """A glove that times its patterns itself; see `Glove`.
 
     A pattern has started when the device has acknowledged it, and ended when the device says so. It fails if it
-    is not acknowledged after two repetitions, if something else is asked for, or if the line dies.
+    is not acknowledged after two repetitions, if something else is asked for, if the line dies, or if the
+    device's answers cannot be true. It ends in any case, even if the operating system does not return from a
+    call.
 
     Args:
         uri: The device as its path; see above.
@@ -42,7 +52,9 @@ class SerialGlove:
             raise ConfigError(f"{uri.text}: no device; for example serial:///dev/ttyACM0")
         self._calibration = load_calibration(uri.options.get("calibration"))
         self.link = SerialLink(uri.path, link_timing(uri))
-        self._awaited = 0
+        # Every pattern ends exactly once, in the order of the wishes: counting tells whom a report is about.
+        self._asked = self._ended = self._given_up = 0
+        self._overdue_ns = 0
         self._closed = False
         self._reports: list[Report] = []
         self._offset_ns: int | None = None
@@ -51,7 +63,19 @@ class SerialGlove:
     @property
     def connected(self) -> bool:
         """See `Glove.connected`."""
-        return not self._closed and self.link.connected
+        return not self.fault
+
+    @property
+    def fault(self) -> str:
+        """See `Glove.fault`."""
+        if self._closed:
+            return CLOSED
+        return "its line hangs" if self._given_up > self._ended else self.link.session.fault
+
+    @property
+    def rejected(self) -> Counter[str]:
+        """See `Glove.rejected`."""
+        return self.link.session.rejected
 
     def play(self, pattern: Pattern, now_ns: int) -> None:
         """See `Glove.play`."""
@@ -60,27 +84,40 @@ class SerialGlove:
             self._reports.append(Report(Outcome.FAILED, now_ns))
             return
         frames = device_frames(pattern, self._calibration)
-        self._awaited += 1
-        self.link.order(lambda session, at_ns: session.play(frames, at_ns))
+        asked_ns = time.monotonic_ns()
+        self._asked += 1
+        self._overdue_ns = now_ns + pattern.length_ms * NS_PER_S // 1000 + OVERDUE_NS
+
+        def order(session: Session, at_ns: int) -> None:
+            if at_ns - asked_ns > FRESH_NS:
+                session.refuse(at_ns)
+            else:
+                session.play(frames, at_ns)
+
+        self.link.order(order)
 
     def poll(self, now_ns: int) -> list[Report]:
         """See `Glove.poll`."""
         offset = self._note(now_ns)
         for report in self.link.reports():
-            if report.outcome is not Outcome.STARTED:
-                self._awaited -= 1
-            self._reports.append(Report(report.outcome, report.at_ns + offset))
+            if self._ended >= self._given_up:
+                self._reports.append(Report(report.outcome, report.at_ns + offset))
+            self._ended += report.outcome is not Outcome.STARTED
+        if self._waiting and now_ns > self._overdue_ns:
+            self._reports += [Report(Outcome.FAILED, now_ns)] * (self._asked - max(self._ended, self._given_up))
+            self._given_up = self._asked
+            self.link.order(Session.stop)
         reports, self._reports = self._reports, []
         return reports
 
     def next_ns(self) -> int | None:
         """See `Glove.next_ns`."""
-        return self._polled_ns + _POLL_NS if self._awaited else None
+        return self._polled_ns + _POLL_NS if self._waiting else None
 
     def stop(self, now_ns: int) -> None:
         """See `Glove.stop`."""
         self._note(now_ns)
-        if self._awaited and not self._closed:
+        if self._waiting and not self._closed:
             self.link.order(Session.stop)
 
     def close(self) -> None:
@@ -88,6 +125,10 @@ class SerialGlove:
         if not self._closed:
             self._closed = True
             self.link.close()
+
+    @property
+    def _waiting(self) -> bool:
+        return self._asked > max(self._ended, self._given_up)
 
     def _note(self, now_ns: int) -> int:
         """Learns how far the caller's clock is ahead of the line's.

@@ -11,7 +11,8 @@ from contextlib import suppress
 import serial
 
 from glove_bridge.gloves.base import Report
-from glove_bridge.session import LinkTiming, Session
+from glove_bridge.link_timing import LinkTiming
+from glove_bridge.session import NOT_A_GLOVE, Session
 
 Order = Callable[[Session, int], None]
 """What to ask the session for, and when, ns."""
@@ -24,6 +25,10 @@ FIRST_REST_S, LONGEST_REST_S = 0.1, 0.5
 
 WRITE_S, CLOSE_S = 0.25, 1.0
 """How long a write may take before the port counts as dead, and how long closing waits for the thread."""
+
+LONGEST_READ = 4096
+MOST_BABBLE = 65_536
+"""A port that says so much and is no glove is given a rest, or reading it would take all the time there is."""
 
 _log = logging.getLogger("glove")
 
@@ -55,8 +60,8 @@ class SerialLink:
 
     @property
     def connected(self) -> bool:
-        """Whether a session is open."""
-        return self.session.device is not None
+        """Whether patterns can be felt."""
+        return not self.session.fault
 
     def order(self, order: Order) -> None:
         """Has the session asked for something, by the thread that owns it."""
@@ -123,8 +128,10 @@ class SerialLink:
             self._tell()
             if closing and self.session.quiet:
                 return
-            heard = port.read(max(1, port.in_waiting))
+            heard = port.read(min(max(1, port.in_waiting), LONGEST_READ))
             self.session.receive(heard, time.monotonic_ns())
+            if self.session.babble > MOST_BABBLE:
+                raise OSError(NOT_A_GLOVE)
 
     def _obey(self) -> None:
         with suppress(queue.Empty):

@@ -4,6 +4,7 @@ import logging
 import sys
 from typing import TextIO
 
+from glove_bridge.gloves.base import CLOSED
 from glove_bridge.gloves.timed import TimedGlove
 from glove_bridge.patterns.pattern import Frame, Pattern
 from glove_bridge.patterns.schema import FINGERS
@@ -31,16 +32,11 @@ class TerminalGlove(TimedGlove):
         self._stream: TextIO | None = stream or sys.stdout
         self._in_place = self._stream.isatty()
 
-    @property
-    def connected(self) -> bool:
-        """See `Glove.connected`."""
-        return self._stream is not None
-
     def close(self) -> None:
         """See `Glove.close`."""
         if self._stream is not None and self._in_place:
             self._write("\n")
-        self._stream = None
+        self._stream, self.fault = None, CLOSED
 
     def _show(self, pattern: Pattern | None, frame: Frame | None, now_ns: int) -> None:  # noqa: ARG002  interface
         line = f"{draw(frame)}  {pattern.name if pattern else ''}"
@@ -57,7 +53,7 @@ class TerminalGlove(TimedGlove):
             self._stream.flush()
         except (OSError, ValueError) as error:
             _log.warning("the terminal is gone (%s); patterns are no longer drawn", error)
-            self._stream = None
+            self._stream, self.fault = None, f"the terminal is gone: {error}"
 
 
 def draw(frame: Frame | None) -> str:

@@ -1,6 +1,7 @@
 """The part that gloves without a clock of their own share: which frame is on when."""
 
 from abc import ABC, abstractmethod
+from collections import Counter
 
 from glove_bridge.gloves.base import Outcome, Report
 from glove_bridge.patterns.pattern import Frame, Pattern
@@ -12,9 +13,15 @@ class TimedGlove(ABC):
     """Times the frames by the clock that it is polled with; see `Glove`.
 
     A frame that was due while nobody polled is skipped, never played late: a pattern keeps its length.
+
+    Attributes:
+        fault: See `Glove.fault`.
+        rejected: Nothing: there is no device that could say anything.
     """
 
     def __init__(self) -> None:
+        self.fault = ""
+        self.rejected: Counter[str] = Counter()
         self._pattern: Pattern | None = None
         self._started_ns = 0
         self._frame = -1
@@ -23,7 +30,7 @@ class TimedGlove(ABC):
     @property
     def connected(self) -> bool:
         """See `Glove.connected`."""
-        return True
+        return not self.fault
 
     def play(self, pattern: Pattern, now_ns: int) -> None:
         """See `Glove.play`; the first frame is shown before it returns."""

@@ -5,6 +5,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import attrs
 import serial
 
 from glove_bridge.framing import StreamDecoder, encode
@@ -20,11 +21,15 @@ class Asker:
     Args:
         path: The port.
         baud: Its rate.
+
+    Attributes:
+        session: What it names in its commands: the nonce of its last greeting.
     """
 
     def __init__(self, path: Path, baud: int = USB_BAUD) -> None:
         self._port = serial.Serial(str(path), baud, timeout=0.005)
         self._decoder = StreamDecoder()
+        self.session = 0
 
     def __enter__(self) -> Self:
         return self
@@ -36,6 +41,7 @@ class Asker:
 
     def greet(self, deadman_ms: int = USB_DEADMAN_MS, nonce: int = 0xBEEF) -> HelloReply:
         """Opens a session whose numbering starts at 0."""
+        self.session = nonce
         reply = self._insist(Hello(0, nonce, deadman_ms))
         assert isinstance(reply, HelloReply)
         return reply
@@ -48,7 +54,7 @@ class Asker:
 
     def ask(self, command: Command) -> Reply | None:
         """Sends a command once and returns its answer, None if none comes in time."""
-        self.send(encode(command))
+        self.send(self.line(command))
         until = time.monotonic() + PATIENCE_S
         while time.monotonic() < until:
             for message in self._decoder.feed(self._port.read(64)):
@@ -56,9 +62,18 @@ class Asker:
                     return message
         return None
 
+    def line(self, command: Command) -> bytes:
+        """Returns the bytes of a command of its session."""
+        return encode(command if isinstance(command, Hello) else attrs.evolve(command, session=self.session))
+
     def send(self, line: bytes) -> None:
         """Writes bytes."""
         self._port.write(line)
+
+    def forget(self) -> None:
+        """Drops the answers that nobody has read."""
+        self._port.reset_input_buffer()
+        self._decoder = StreamDecoder()
 
     def _insist(self, command: Command) -> Reply:
         """Asks again if need be: a chip that starts hears nothing."""

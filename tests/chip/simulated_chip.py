@@ -21,6 +21,9 @@ CYCLES_PER_MS = 16_000
 SPREAD_MS = 0.3
 """The firmware sets the motors one after the other; changes this close together are one step."""
 
+REPEAT_S = 120.0
+"""What ten minutes of the chip's time may take here."""
+
 REPORT_S = 2.0
 """What a motor did is known here only after the host has its answer."""
 
@@ -108,14 +111,19 @@ class SimulatedChip:
         """Returns when frames were `heard` or `said` by the chip, to the end of their last stop bit, ms."""
         return [e["cycle"] / CYCLES_PER_MS for e in self._snapshot() if e["event"] == event]
 
-    def do(self, command: str) -> float:
+    def do(self, command: str, timeout_s: float = 10.0) -> float:
         """Has it unplugged, plugged, cut, joined, reset or hung, by the verb; returns when it was done, ms."""
         assert self._process.stdin is not None
         seen = len(self._snapshot())
         self._process.stdin.write(f"{command}\n")
-        done = self._wait_event("done", seen)
-        assert done["command"] == command
+        done = self._wait_event("done", seen, timeout_s)
+        assert done["command"] == command.split(maxsplit=1)[0]
         return float(done["cycle"] / CYCLES_PER_MS)
+
+    def repeat(self, lines: Iterable[bytes], period_ms: int, length_s: int) -> float:
+        """Has it hear lines in turn, one per period, as fast as it can be simulated; returns the end, ms."""
+        pieces = ",".join(line.hex() for line in lines)
+        return self.do(f"repeat {period_ms} {1000 * length_s} {pieces}", REPEAT_S)
 
     def wait(self, condition: Callable[[Self], bool], timeout_s: float = 10.0) -> None:
         """Waits until an event makes a condition true; fails the test if none does in time."""
@@ -129,8 +137,8 @@ class SimulatedChip:
             self._changed.wait_for(lambda: [step.duties for step in self.steps] == wanted, REPORT_S)
             assert [step.duties for step in self.steps] == wanted
 
-    def _wait_event(self, name: str, since: int = 0) -> dict[str, Any]:
-        self.wait(lambda chip: any(event["event"] == name for event in chip._events[since:]))
+    def _wait_event(self, name: str, since: int = 0, timeout_s: float = 10.0) -> dict[str, Any]:
+        self.wait(lambda chip: any(event["event"] == name for event in chip._events[since:]), timeout_s)
         return next(event for event in self._events[since:] if event["event"] == name)
 
     def _snapshot(self) -> list[dict[str, Any]]:

@@ -166,7 +166,7 @@ def test_at_the_wrong_rate_nothing_is_understood(start_chip: Callable[..., Simul
 def test_a_flood_of_commands_costs_answers_and_nothing_else(chip: SimulatedChip) -> None:
     with Asker(chip.path) as asker:
         asker.greet()
-        asker.send(b"".join(encode(Ping(1 + k % 100)) for k in range(400)))
+        asker.send(b"".join(asker.line(Ping(1 + k % 100)) for k in range(400)))
         ack = asker.tell(Play(101, (PlayFrame(50, ALL),)))
         assert ack.status is Status.OK
         chip.wait(lambda chip: len(chip.drives) == 10)

@@ -10,8 +10,9 @@ import pytest
 
 from glove_bridge.gloves.base import Outcome
 from glove_bridge.gloves.serial_link import SerialLink
+from glove_bridge.link_timing import USB
 from glove_bridge.protocol import PlayFrame
-from glove_bridge.session import USB, Session
+from glove_bridge.session import Session
 from tests.chip.simulated_chip import SimulatedChip
 
 pytestmark = [pytest.mark.chip, pytest.mark.timeout(400)]

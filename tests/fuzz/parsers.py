@@ -22,10 +22,12 @@ from glove_bridge.calibration_file import SHIPPED, load_calibration
 from glove_bridge.framing import StreamDecoder
 from glove_bridge.framing import decode as deframe
 from glove_bridge.framing import encode as frame
+from glove_bridge.gloves.base import Outcome
 from glove_bridge.gloves.serial import link_timing
+from glove_bridge.link_timing import USB
 from glove_bridge.patterns import FOLDER, load_patterns
-from glove_bridge.protocol import Ping
-from glove_bridge.session import USB, Session
+from glove_bridge.protocol import PROTOCOL, Ack, Hello, HelloReply, Message, Ping, Play, Set, Stop
+from glove_bridge.session import Session
 from human_relay.pointing import PointerState, hear
 from human_relay.sources.pointer import pointer_address
 from human_relay.sources.recording import read_csv, relative_yaw
@@ -33,6 +35,7 @@ from observer.console import protocol as page
 from observer.console.access import is_own_host, is_same_site, is_token
 from observer.console.pattern_file import read_patterns as read_page_patterns
 from observer.trace.read import open_trace
+from shared.clock import NS_PER_S
 from shared.codec import decode, encode
 from shared.config import SCENARIOS, load_scenario
 from shared.errors import DecodeError, SwarmTouchError
@@ -52,6 +55,9 @@ from shared.topics import HAND, TOPICS, parse_key, rank
 from shared.transport import Arrival
 from shared.uri import parse_uri
 from tests.fuzz import listeners, seeds
+
+PATIENCE_NS = 3 * NS_PER_S
+"""In so long a glove has told what became of a pattern, or the host has given it up."""
 
 CORPUS = Path(__file__).parent / "corpus"
 """Inputs that were findings once, or lead deep into a parser; a folder per row."""
@@ -139,6 +145,40 @@ def _serial(data: bytes) -> object:
     heard = StreamDecoder().feed(data + frame(Ping(9)))
     assert heard[-1] == Ping(9), "garbage has cost the message after it"
     return [frame(message) for message in heard]
+
+
+def _glove(data: bytes) -> object:
+    """A glove that answers what the data says, well framed, eight bytes each time, again and again."""
+    session, reports, now_ns, turn = Session(USB, nonce=0), [], 0, 0
+    session.opened(now_ns)
+    asked_ns = None
+    while now_ns < PATIENCE_NS:
+        if session.device is not None and asked_ns is None:
+            asked_ns = now_ns
+            session.play(seeds.FRAMES, now_ns)
+        line = session.due(now_ns)
+        if line:
+            session.receive(_glove_answer(deframe(line[1:-1]), data[turn : turn + 8]), now_ns + 1)
+            turn = turn + 8 if turn + 8 < len(data) else 0
+        reports += [report.outcome for report in session.take_reports()]
+        now_ns = max(session.next_ns() or PATIENCE_NS, now_ns + 1_000_000)
+    ended = [outcome for outcome in reports if outcome is not Outcome.STARTED]
+    assert asked_ns is None or asked_ns > PATIENCE_NS / 2 or len(ended) == 1, "a pattern that never ends"
+    return reports
+
+
+def _glove_answer(command: Message, said: bytes) -> bytes:
+    """Makes a frame whose checksum is right: any packet, or an answer to this very command; or nothing."""
+    kind, body = (said[0] & 3, said[1:]) if said else (0, b"")
+    if kind == 0:
+        return b""
+    packet = body
+    if kind == 1 and isinstance(command, Hello):
+        name = command.nonce.to_bytes(2, "big")
+        packet = bytes((HelloReply.TYPE, command.seq, PROTOCOL, 2, 0)) + name + body[:6]
+    elif kind == 1 and isinstance(command, Set | Play | Stop | Ping):
+        packet = bytes((Ack.TYPE, command.seq)) + command.session.to_bytes(2, "big") + body[:5]
+    return b"\0" + bytes(cobs.encode(packet + crc_hqx(packet, 0xFFFF).to_bytes(2, "big"))) + b"\0"
 
 
 def _vehicle(data: bytes) -> object:
@@ -236,6 +276,7 @@ PARSERS = (
     _Wire(name="message", parse=_message, seeds=seeds.messages),
     _Wire(name="signed-hand", parse=_signed_hand, seeds=seeds.hands),
     _Wire(name="serial", parse=_serial, seeds=seeds.frames),
+    _Wire(name="glove", parse=_glove, seeds=seeds.glove_answers),
     _Wire(name="vehicle", parse=_vehicle, seeds=seeds.vehicle_datagrams),
     _Wire(
         name="pointer",

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import struct
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -106,9 +107,19 @@ def hands() -> list[bytes]:
     return [sample, sign_with(keys().hand_private)(sample), encode(hand(2))]
 
 
+FRAMES = (PlayFrame(200, (0, 0, 130, 0, 0)), PlayFrame(300, (191, 0, 0, 0, 191)))
+
+
+def glove_answers() -> list[bytes]:
+    """Makes what a glove says after each other, in pieces of eight bytes: greeting, playing, at rest."""
+    greeting = struct.pack(">BBBHHx", 1, 5, 32, 10_000, 350)
+    playing = [struct.pack(">BBHHxx", 1, Status.OK, ms, 0) for ms in (500, 383, 267, 150, 33, 0)]
+    return [b"".join((greeting, *playing)), greeting + playing[0], greeting]
+
+
 def frames() -> list[bytes]:
     """Makes one frame of every message on the glove's line."""
-    steps = (PlayFrame(200, (0, 0, 130, 0, 0)), PlayFrame(300, (191, 0, 0, 0, 191)))
+    steps = FRAMES
     replies = (Ack(7, Status.OK, 500, 0), HelloReply(1, PROTOCOL, (1, 0), 9, 5, 32, 10_000, 350))
     commands = (Hello(0, 9, 350), Set(1, (1, 2, 3, 4, 5)), Play(2, steps), Stop(3), Ping(4))
     return [frame(message) for message in (*replies, *commands)]

@@ -1,6 +1,6 @@
 """The host's end of the glove's line: virtual time, a simulated device, a line that loses frames."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain, repeat
 
 import pytest
@@ -9,13 +9,16 @@ from hypothesis import strategies as st
 
 from glove_bridge.framing import StreamDecoder, encode
 from glove_bridge.gloves.base import Report
+from glove_bridge.link_timing import USB, XBEE, LinkTiming
 from glove_bridge.protocol import PROTOCOL, Ack, Hello, HelloReply, Ping, Play, PlayFrame, Set, Status, Stop
-from glove_bridge.session import ATTEMPTS, USB, XBEE, LinkTiming, Session
+from glove_bridge.session import ATTEMPTS, Session
 from tests.simulated_glove import MS, OFF, Device
 
 STRONG, WEAK = (0, 0, 200, 0, 0), (90, 0, 0, 0, 90)
 PATTERN = (PlayFrame(200, STRONG), PlayFrame(100, WEAK))
 LENGTH_MS = 300
+PLAY = 4
+"""Number of the frame with the first pattern, when nothing was lost before: HELLO, PING and their answers."""
 
 
 class Line:
@@ -23,7 +26,8 @@ class Line:
 
     def __init__(self, timing: LinkTiming = USB, losses: Iterable[bool] = ()) -> None:
         self.device, self.session = Device(), Session(timing, nonce=7)
-        self.losses, self.now_ns = chain(losses, repeat(False)), 0
+        self.losses: Iterator[bool] = chain(losses, repeat(False))
+        self.now_ns = 0
         self.asked: list[object] = []
         self.reports: list[Report] = []
         self._decoder = StreamDecoder()
@@ -98,7 +102,7 @@ def test_a_pattern_is_reported_as_the_device_tells_it() -> None:
 
 
 def test_a_lost_answer_is_asked_for_again_and_the_pattern_plays_once() -> None:
-    line = Line(losses=losing(3))
+    line = Line(losses=losing(PLAY + 1))
     line.open()
     begun_ns = line.now_ns
     line.play()
@@ -111,11 +115,11 @@ def test_a_lost_answer_is_asked_for_again_and_the_pattern_plays_once() -> None:
 
 
 def test_a_pattern_that_is_never_heard_fails_after_two_repetitions_and_a_new_session_begins() -> None:
-    line = Line(losses=losing(2, 3, 4))
+    line = Line(losses=losing(PLAY, PLAY + 1, PLAY + 2))
     line.open()
     line.play()
     line.run(400)
-    assert line.names()[:6] == ["Hello", "Play", "Play", "Play", "Hello", "Ping"]
+    assert line.names()[:7] == ["Hello", "Ping", "Play", "Play", "Play", "Hello", "Ping"]
     assert line.outcomes() == ["failed"]
     assert line.device.plays == []
     first, second = (message.nonce for message in line.asked if isinstance(message, Hello))
@@ -126,7 +130,7 @@ def test_a_pattern_that_is_never_heard_fails_after_two_repetitions_and_a_new_ses
 
 
 def test_a_pattern_whose_answers_are_all_lost_is_stopped() -> None:
-    line = Line(losses=losing(3, 5, 7))
+    line = Line(losses=losing(PLAY + 1, PLAY + 3, PLAY + 5))
     line.open()
     begun_ns = line.now_ns
     line.play()
@@ -216,19 +220,30 @@ def test_a_device_of_another_protocol_is_named_and_not_used() -> None:
 def test_a_refused_pattern_fails_and_the_session_lives() -> None:
     session = opened_session()
     session.play(PATTERN, 0)
-    (asked,) = StreamDecoder().feed(session.due(0))
-    session.receive(encode(Ack(asked.seq, Status.BAD_BODY, 0, 0)), MS)
+    asked = said(session, 0)
+    session.receive(encode(Ack(asked.seq, Status.BAD_BODY, 0, 0, session=asked.session)), MS)
     assert session.take_reports() == [("failed", MS)]
     assert session.device is not None
+    assert isinstance(said(session, MS), Stop), "what was there before does not go on"
 
 
 def opened_session() -> Session:
     session = Session(USB, nonce=0)
     session.opened(0)
-    (hello,) = StreamDecoder().feed(session.due(0))
-    assert isinstance(hello, Hello)
-    session.receive(encode(Device().answer(hello, 0)), 0)
+    device = Device()
+    for _ in range(2):
+        (command,) = StreamDecoder().feed(session.due(0))
+        assert not isinstance(command, Ack | HelloReply)
+        session.receive(encode(device.answer(command, 0)), 0)
+    assert session.fault == ""
     return session
+
+
+def said(session: Session, now_ns: int) -> Play | Set | Stop | Ping:
+    """Returns the command that a session has for the device."""
+    (command,) = StreamDecoder().feed(session.due(now_ns))
+    assert isinstance(command, Play | Set | Stop | Ping)
+    return command
 
 
 def test_the_next_deadline_is_never_missed() -> None:
@@ -278,7 +293,7 @@ def test_every_command_has_a_number_of_its_own(kind: type) -> None:
 def test_whatever_is_lost_no_pattern_is_and_no_motor_stays_on(
     losses: list[bool], wishes: list[tuple[str, int]]
 ) -> None:
-    line = Line(losses=[False, False, *losses])
+    line = Line(losses=[False, False, False, False, *losses])
     line.open()
     played = 0
     for wish, ms in wishes:
@@ -288,6 +303,7 @@ def test_whatever_is_lost_no_pattern_is_and_no_motor_stays_on(
         else:
             line.session.stop(line.now_ns)
         line.run(ms)
+    line.losses = repeat(False)
     line.run(1_500)
     assert line.session.device is not None
     assert line.device.duties == OFF

@@ -33,11 +33,11 @@ FRAMES = st.lists(
 ).map(tuple)
 MESSAGES: st.SearchStrategy[Message] = st.one_of(
     st.builds(Hello, BYTE, WORD, WORD, BYTE),
-    st.builds(Set, BYTE, DUTIES),
-    st.builds(Play, BYTE, FRAMES),
-    st.builds(Stop, BYTE),
-    st.builds(Ping, BYTE),
-    st.builds(Ack, BYTE, st.sampled_from(Status), WORD, WORD),
+    st.builds(Set, BYTE, DUTIES, session=WORD),
+    st.builds(Play, BYTE, FRAMES, session=WORD),
+    st.builds(Stop, BYTE, session=WORD),
+    st.builds(Ping, BYTE, session=WORD),
+    st.builds(Ack, BYTE, st.sampled_from(Status), WORD, WORD, session=WORD),
     st.builds(HelloReply, BYTE, BYTE, st.tuples(BYTE, BYTE), WORD, BYTE, BYTE, WORD, WORD),
 )
 
@@ -52,9 +52,9 @@ def test_what_is_encoded_is_decoded(message: Message) -> None:
 
 
 def test_the_bytes_of_a_message_are_these() -> None:
-    assert encode(Ping(7)).hex(" ") == "00 05 05 07 92 1d 00"
-    assert encode(Hello(0, 0x1234, 350)).hex(" ") == "00 02 01 08 01 12 34 01 5e 84 5e 00"
-    assert [len(encode(Play(0, (PlayFrame(200, (9,) * 5),) * n))) for n in (1, 3, 5, 11)] == [14, 28, 42, 84]
+    assert encode(Ping(7, session=0x1234)).hex(" ") == "00 07 05 07 12 34 ae d3 00"
+    assert encode(Hello(0, 0x1234, 350)).hex(" ") == "00 02 01 08 02 12 34 01 5e 6a 8c 00"
+    assert [len(encode(Play(0, (PlayFrame(200, (9,) * 5),) * n))) for n in (1, 3, 5, 10)] == [16, 30, 44, 79]
 
 
 def test_every_pattern_of_a_file_fits_with_a_kick_start_in_every_frame() -> None:

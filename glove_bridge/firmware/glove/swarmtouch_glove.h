@@ -10,8 +10,8 @@
 
 namespace swarmtouch {
 
-constexpr uint8_t kProtocol = 1;
-constexpr uint8_t kFirmwareMajor = 1;
+constexpr uint8_t kProtocol = 2;
+constexpr uint8_t kFirmwareMajor = 2;
 constexpr uint8_t kFirmwareMinor = 0;
 constexpr uint8_t kMotors = 5;
 constexpr uint8_t kMaxFrames = 32;
@@ -42,10 +42,11 @@ enum Status : uint8_t {
 };
 
 constexpr uint8_t kFrameSize = 2 + kMotors;
-constexpr uint8_t kHead = 2;  // type, seq
+constexpr uint8_t kHead = 2;     // type, seq
+constexpr uint8_t kSession = 2;  // its nonce; not in a greeting, whose form is the same in every version
 constexpr uint8_t kCrc = 2;
-constexpr uint8_t kMaxPacket = kHead + kFrameSize * kMaxFrames + kCrc;
-constexpr uint8_t kMaxReply = kHead + 11 + kCrc;
+constexpr uint8_t kMaxPacket = kHead + kSession + kFrameSize * kMaxFrames + kCrc;
+constexpr uint8_t kMaxReply = kHead + 11 + kCrc;  // HELLO's
 static_assert(kMaxPacket < 254, "COBS must add one byte only");
 
 inline uint16_t read16(const uint8_t* at) { return static_cast<uint16_t>(at[0] << 8 | at[1]); }
@@ -234,7 +235,6 @@ class Glove {
   bool feed(uint8_t byte, uint32_t nowUs) {
     if (!receiver_.feed(byte)) return false;
     tick(nowUs);
-    heardUs_ = nowUs;
     status_ = obey(nowUs);
     return true;
   }
@@ -242,7 +242,7 @@ class Glove {
   // Moves on to `nowUs`: the next frame, the end of a pattern, the dead-man.
   void tick(uint32_t nowUs) {
     player_.tick(nowUs);
-    if (session_ && nowUs - heardUs_ >= 1000UL * deadmanMs_) {
+    if (session_ && nowUs - obeyedUs_ >= 1000UL * deadmanMs_) {
       session_ = false;
       player_.stop();
     }
@@ -254,7 +254,7 @@ class Glove {
       reply_.start(kHelloReply, receiver_.seq()).put(kProtocol).put(kFirmwareMajor).put(kFirmwareMinor);
       reply_.put16(nonce_).put(kMotors).put(kMaxFrames).put16(kMaxPatternMs).put16(deadmanMs_).finish();
     } else {
-      reply_.start(kAck, receiver_.seq()).put(status_).put16(player_.remainingMs(nowUs));
+      reply_.start(kAck, receiver_.seq()).put16(commandSession()).put(status_).put16(player_.remainingMs(nowUs));
       reply_.put16(receiver_.rejected()).finish();
     }
     return reply_;
@@ -264,18 +264,25 @@ class Glove {
   bool session() const { return session_; }
 
  private:
+  // Whatever is not obeyed, however whole, must not keep the motors alive: only what returns kOk feeds the dead-man.
   Status obey(uint32_t nowUs) {
-    if (receiver_.type() == kHello) return hello();
-    if (!session_) return kNoSession;
+    if (receiver_.type() == kHello) return hello(nowUs);
+    if (receiver_.bodySize() < kSession) return kBadBody;
+    if (!session_ || commandSession() != nonce_) return kNoSession;
     const int8_t ahead = static_cast<int8_t>(receiver_.seq() - newest_);
     if (ahead <= 0) return ahead == 0 ? kDuplicate : kStale;
-    const Status status = act(nowUs);
-    if (status == kOk) newest_ = receiver_.seq();
-    return status;
+    const Status status = act(receiver_.body() + kSession, receiver_.bodySize() - kSession, nowUs);
+    if (status != kOk) return status;
+    newest_ = receiver_.seq();
+    obeyedUs_ = nowUs;
+    return kOk;
   }
 
+  // What the command says of its session; an answer repeats it, so that a host knows its own.
+  uint16_t commandSession() const { return receiver_.bodySize() < kSession ? 0 : read16(receiver_.body()); }
+
   // Opens a session, unless it is open. To another version it only says its own.
-  Status hello() {
+  Status hello(uint32_t nowUs) {
     const uint8_t* body = receiver_.body();
     if (receiver_.bodySize() == 0) return kBadBody;
     if (body[0] != kProtocol) return kOk;
@@ -286,13 +293,12 @@ class Glove {
     session_ = true;
     nonce_ = nonce;
     newest_ = receiver_.seq();
+    obeyedUs_ = nowUs;
     deadmanMs_ = deadmanMs < kMinDeadmanMs ? kMinDeadmanMs : deadmanMs > kMaxDeadmanMs ? kMaxDeadmanMs : deadmanMs;
     return kOk;
   }
 
-  Status act(uint32_t nowUs) {
-    const uint8_t* body = receiver_.body();
-    const uint8_t size = receiver_.bodySize();
+  Status act(const uint8_t* body, uint8_t size, uint32_t nowUs) {
     switch (receiver_.type()) {
       case kSet:
         if (size != kMotors) return kBadBody;
@@ -323,7 +329,7 @@ class Glove {
   uint16_t nonce_ = 0;
   uint16_t deadmanMs_ = kMinDeadmanMs;
   uint8_t newest_ = 0;  // seq of the newest command obeyed
-  uint32_t heardUs_ = 0;
+  uint32_t obeyedUs_ = 0;
 };
 
 }  // namespace swarmtouch

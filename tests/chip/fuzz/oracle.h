@@ -71,7 +71,7 @@ class Oracle {
   }
 
   void tick(uint64_t nowUs) {
-    if (session_ && nowUs - heardUs_ >= deadmanUs_) session_ = false;
+    if (session_ && nowUs - obeyedUs_ >= deadmanUs_) session_ = false;
     if (!session_) rest();
   }
 
@@ -83,14 +83,13 @@ class Oracle {
     }
     if (line_.empty()) return false;
     Bytes packet;
-    const bool whole = unstuff(line_, &packet) && packet.size() >= 4 && packet.size() <= 228 && crcOf(packet) == 0;
+    const bool whole = unstuff(line_, &packet) && packet.size() >= 4 && packet.size() <= 230 && crcOf(packet) == 0;
     line_.clear();
     if (!whole) {
       ++rejected_;
       return false;
     }
     tick(nowUs);
-    heardUs_ = nowUs;
     const Bytes body(packet.begin() + 2, packet.end() - 2);
     *answer = packet[0] == 1 ? greeted(packet[1], body, nowUs) : told(packet[0], packet[1], body, nowUs);
     return true;
@@ -110,15 +109,16 @@ class Oracle {
   }
 
   Bytes greeted(uint8_t seq, const Bytes& body, uint64_t nowUs) {
-    if (body.empty() || (body[0] == 1 && body.size() != 5)) return ack(seq, 4, nowUs);
-    if (body[0] == 1 && !(session_ && nonce_ == at16(body, 1))) {
+    if (body.empty() || (body[0] == 2 && body.size() != 5)) return ack(seq, body, 4, nowUs);
+    if (body[0] == 2 && !(session_ && nonce_ == at16(body, 1))) {
       rest();
       session_ = true;
       nonce_ = at16(body, 1);
       newest_ = seq;
+      obeyedUs_ = nowUs;
       deadmanUs_ = 1000 * std::min(std::max(at16(body, 3), 100u), 2000u);
     }
-    Bytes reply{0x81, seq, 1, 1, 0};
+    Bytes reply{0x81, seq, 2, 2, 0};
     append16(&reply, nonce_);
     reply.push_back(5);
     reply.push_back(32);
@@ -127,16 +127,19 @@ class Oracle {
     return reply;
   }
 
-  Bytes told(uint8_t type, uint8_t seq, const Bytes& body, uint64_t nowUs) {
-    if (!session_) return ack(seq, 2, nowUs);
-    if (seq == newest_) return ack(seq, 1, nowUs);
-    if ((seq - newest_ + 256) % 256 > 127) return ack(seq, 3, nowUs);
-    if (type < 2 || type > 5) return ack(seq, 5, nowUs);
+  Bytes told(uint8_t type, uint8_t seq, const Bytes& said, uint64_t nowUs) {
+    if (said.size() < 2) return ack(seq, said, 4, nowUs);
+    if (!session_ || at16(said, 0) != nonce_) return ack(seq, said, 2, nowUs);
+    if (seq == newest_) return ack(seq, said, 1, nowUs);
+    if ((seq - newest_ + 256) % 256 > 127) return ack(seq, said, 3, nowUs);
+    if (type < 2 || type > 5) return ack(seq, said, 5, nowUs);
+    const Bytes body(said.begin() + 2, said.end());
     const bool done = type == 2 ? set(body) : type == 3 ? play(body, nowUs) : body.empty();
-    if (!done) return ack(seq, 4, nowUs);
+    if (!done) return ack(seq, said, 4, nowUs);
     if (type == 4) rest();
     newest_ = seq;
-    return ack(seq, 0, nowUs);
+    obeyedUs_ = nowUs;
+    return ack(seq, said, 0, nowUs);
   }
 
   bool set(const Bytes& body) {
@@ -162,12 +165,15 @@ class Oracle {
     return true;
   }
 
-  Bytes ack(uint8_t seq, uint8_t status, uint64_t nowUs) const {
+  // `said` is the body of what is answered: it begins with the session.
+  Bytes ack(uint8_t seq, const Bytes& said, uint8_t status, uint64_t nowUs) const {
     uint64_t totalUs = 0;
     for (const Frame& frame : frames_) totalUs += frame.us;
     const uint64_t passedUs = nowUs - startUs_;
     const uint64_t remainingMs = passedUs >= totalUs ? 0 : totalUs / 1000 - passedUs / 1000;
-    Bytes reply{0x80, seq, status};
+    Bytes reply{0x80, seq};
+    append16(&reply, said.size() < 2 ? 0 : at16(said, 0));
+    reply.push_back(status);
     append16(&reply, held_ ? 0xFFFF : static_cast<unsigned>(remainingMs));
     append16(&reply, rejected_);
     return reply;
@@ -179,7 +185,7 @@ class Oracle {
   unsigned nonce_ = 0;
   uint8_t newest_ = 0;
   uint64_t deadmanUs_ = 100000;
-  uint64_t heardUs_ = 0;
+  uint64_t obeyedUs_ = 0;
   std::vector<Frame> frames_;  // what plays; one that is held
   bool held_ = false;
   uint64_t startUs_ = 0;

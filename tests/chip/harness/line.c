@@ -101,12 +101,14 @@ void line_cut(bool cut) { is_cut = cut; }
 
 void line_flush(void) { heard.size = 0; }
 
+void line_hear(uint8_t byte) {
+  if (heard.size < sizeof heard.bytes) heard.bytes[(heard.head + heard.size++) % sizeof heard.bytes] = byte;
+}
+
 static void read_host(void) {
   uint8_t chunk[4096];
   const ssize_t size = read(master, chunk, sizeof chunk);
-  for (ssize_t k = 0; k < size && heard.size < sizeof heard.bytes; ++k) {
-    heard.bytes[(heard.head + heard.size++) % sizeof heard.bytes] = chunk[k];
-  }
+  for (ssize_t k = 0; k < size; ++k) line_hear(chunk[k]);
 }
 
 void line_wait(int timeout_us) {

@@ -15,6 +15,9 @@ typedef struct {
 // Opens a pseudo-terminal and links it to `path`.
 bool line_plug(const char *path, line_options_t options);
 
+// Takes a byte as if the host had sent it.
+void line_hear(uint8_t byte);
+
 // Removes the link and hangs up.
 void line_unplug(void);
 

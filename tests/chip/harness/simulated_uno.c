@@ -8,7 +8,9 @@
 //   {"event": "heard", "cycle": n}                        the last stop bit of a frame's end (a 0 after other bytes)
 //   {"event": "said", "cycle": n}                         the same of a frame to the host
 //   {"event": "done", "cycle": n, "command": "..."}
-// Obeys on standard input: unplug, plug (the plug carries the power), cut, join (the line only), reset, hang, quit.
+// Obeys on standard input: unplug, plug (the plug carries the power), cut, join (the line only), reset, hang, quit,
+//   repeat PERIOD_MS LENGTH_MS HEX[,HEX...]   hears these bytes, one piece per period, in turn, as fast as it can:
+//                                             nobody waits for the wall clock, or is told of frames, until then
 // With --boot-ms, opening the port resets the chip, as DTR does, and the bootloader takes that long.
 
 #define _GNU_SOURCE
@@ -24,13 +26,19 @@
 #include "line.h"
 
 // Between characters the chip gets 10 us to read the one before: simavr delays the next by what it takes.
-enum { SLICE = CYCLES_PER_MS / 2, MOST_LAG_MS = 100, LONGEST_START_MS = 1000, REST = 160 };
+enum { SLICE = CYCLES_PER_MS / 2, MOST_LAG_MS = 100, LONGEST_START_MS = 1000, REST = 160, LONGEST_COMMAND = 16384 };
 
 static FILE *events;
 static const char *path;
 static line_options_t options = {.seed = 1};
 static uint32_t boot_ms;
 static uint64_t next_character;
+static struct {
+  uint64_t period, next, end;  // cycles
+  const char *all, *at;        // hexadecimal pieces, and where the next one begins
+} repeated;
+
+static bool repeating(void) { return chip_cycle() < repeated.end; }
 
 static void tell(const char *event, uint64_t cycle) {
   fprintf(events, "{\"event\": \"%s\", \"cycle\": %llu}\n", event, (unsigned long long)cycle);
@@ -43,7 +51,7 @@ static void drove(int motor, int duty, uint64_t cycle, uint64_t high) {
 
 static void said(uint8_t byte, uint64_t cycle) {
   static uint8_t before;
-  if (byte == 0 && before != 0) tell("said", cycle);
+  if (byte == 0 && before != 0 && !repeating()) tell("said", cycle);
   before = byte;
   line_give(byte, chip_baud());
 }
@@ -58,7 +66,7 @@ static void run_slice(uint64_t end) {
     if (character != 0 && chip_cycle() >= next_character && line_take(&byte, chip_baud())) {
       chip_hear(byte);
       next_character = chip_cycle() + character + REST;
-      if (byte == 0 && before != 0) tell("heard", chip_cycle() + character);
+      if (byte == 0 && before != 0 && !repeating()) tell("heard", chip_cycle() + character);
       before = byte;
     }
     chip_run_until(next_character > chip_cycle() && next_character < end ? next_character : end);
@@ -70,6 +78,32 @@ static void plug(void) {
     perror("no pseudo-terminal");
     exit(2);
   }
+}
+
+// Puts the next piece on the line.
+static void repeat(void) {
+  unsigned byte;
+  int size;
+  for (; sscanf(repeated.at, "%2x%n", &byte, &size) == 1; repeated.at += size) line_hear(byte);
+  repeated.at = *repeated.at == ',' ? repeated.at + 1 : repeated.all;
+}
+
+static void start_repeating(const char *command) {
+  static char pieces[LONGEST_COMMAND];
+  unsigned period_ms, length_ms;
+  if (sscanf(command, "repeat %u %u %s", &period_ms, &length_ms, pieces) != 3) {
+    fprintf(stderr, "expected repeat PERIOD_MS LENGTH_MS HEX[,HEX...], not %.80s\n", command);
+    exit(2);
+  }
+  repeated.all = repeated.at = pieces;
+  repeated.period = (uint64_t)period_ms * CYCLES_PER_MS;
+  repeated.next = chip_cycle();
+  repeated.end = repeated.next + (uint64_t)length_ms * CYCLES_PER_MS;
+}
+
+static void done(const char *command) {
+  fprintf(events, "{\"event\": \"done\", \"cycle\": %llu, \"command\": \"%.*s\"}\n",
+          (unsigned long long)chip_cycle(), (int)strcspn(command, " "), command);
 }
 
 static bool obey(const char *command) {
@@ -87,18 +121,20 @@ static bool obey(const char *command) {
     chip_reset(boot_ms);
   } else if (strcmp(command, "hang") == 0) {
     chip_hang();
+  } else if (strncmp(command, "repeat ", 7) == 0) {
+    start_repeating(command);
+    return true;  // done when it is over
   } else {
     fprintf(stderr, "unknown command: %s\n", command);
     exit(2);
   }
-  fprintf(events, "{\"event\": \"done\", \"cycle\": %llu, \"command\": \"%s\"}\n",
-          (unsigned long long)chip_cycle(), command);
+  done(command);
   return true;
 }
 
 // Reads commands as they come; false at the last.
 static bool commanded(void) {
-  static char text[256];
+  static char text[LONGEST_COMMAND];
   static size_t size;
   const ssize_t more = read(STDIN_FILENO, text + size, sizeof text - 1 - size);
   if (more == 0) return false;
@@ -111,6 +147,19 @@ static bool commanded(void) {
     memmove(text, end + 1, size + 1);
   }
   return true;
+}
+
+// Runs on from `end` to the end of the repetition, and returns that.
+static uint64_t hurry(uint64_t end) {
+  for (; repeating(); end += SLICE) {
+    if (end >= repeated.next) {
+      repeated.next += repeated.period;
+      repeat();
+    }
+    run_slice(end + SLICE);
+  }
+  done("repeat");
+  return end;
 }
 
 static uint64_t now_us(void) {
@@ -140,6 +189,9 @@ static void run(void) {
     line_wait(now < due_us ? due_us - now : 0);
     if (line_opened() && boot_ms > 0) chip_reset(boot_ms);
     run_slice(end);
+    if (!repeating()) continue;
+    end = hurry(end);
+    started_us = now_us() - end / (CYCLES_PER_MS / 1000);
   }
 }
 
