@@ -96,8 +96,8 @@ class Bridge:
         if role == "drone" and not present:
             self._left_ns[int(number)] = now_ns
 
-    def step(self, now_ns: int) -> Step:
-        """Decides what to publish and to play now."""
+    def step(self, now_ns: int, *, connected: bool = True) -> Step:
+        """Decides what to publish and to play now, on a glove that is there or not."""
         self.steps += 1
         self.missing = missing_drones(self._formation.ids, self.senses.drones, self._left_ns, now_ns)
         drones = {drone: s for drone, s in self.senses.drones.items() if drone not in self.missing}
@@ -110,7 +110,7 @@ class Bridge:
         wish = self._wish(reading) if formed else None
         silent = self._patterns.silent_gate and formed and reading is not None and reading.extent != 0
         self._schedule, decision = decide(
-            self._schedule, wish, self._cue_requests(now_ns), now_ns, silent=silent
+            self._schedule, wish, self._cue_requests(now_ns), now_ns, silent=silent, connected=connected
         )
         return Step(
             state=state,
@@ -135,7 +135,7 @@ class Bridge:
             self._started_ns = report.at_ns
             self._schedule = started(self._schedule, report.at_ns)
             return self._event(request, report.outcome, now_ns, started_ns=report.at_ns)
-        self._schedule = ended(self._schedule)
+        self._schedule = ended(self._schedule, felt=report.outcome is Outcome.FINISHED)
         started_ns, self._started_ns = self._started_ns, 0
         finished_ns = report.at_ns if report.outcome is Outcome.FINISHED else 0
         return self._event(request, report.outcome, now_ns, started_ns=started_ns, finished_ns=finished_ns)

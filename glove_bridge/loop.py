@@ -85,7 +85,7 @@ def run(bridge: Bridge, glove: Glove, bus: Bus, inbox: Inbox, clock: Clock, stop
         bridge.receive(inbox.take())
         now = clock()
         voice.tell_reports(glove, now)
-        step = bridge.step(now)
+        step = bridge.step(now, connected=glove.connected)
         act(glove, step, now)
         voice.tell(step, now)
         voice.tell_reports(glove, now)

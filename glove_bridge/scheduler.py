@@ -5,8 +5,8 @@ is closed, wishes are not queued: when the glove is free again, whatever the sta
 What was wished for meanwhile and is not played is reported as suppressed, once per pattern.
 
 A safety cue does not wait for the gate, only for the pattern that plays. It plays when its condition begins and
-again every `REMIND_NS` while it holds. A condition that is gone for `CLEAR_NS` begins anew; one that flickers
-faster plays no more often than one that lasts.
+again every `REMIND_NS` while it holds; one that was not felt plays as soon as it can be. A condition that is
+gone for `CLEAR_NS` begins anew; one that flickers faster plays no more often than one that lasts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from shared.clock import NS_PER_S
 from shared.messages import Heard
 
 REMIND_NS = 5 * NS_PER_S
-CLEAR_NS = NS_PER_S
+RETRY_NS = CLEAR_NS = NS_PER_S
 _NS_PER_MS = 1_000_000
 
 
@@ -40,10 +40,11 @@ class Request:
 
 
 class Reminder(NamedTuple):
-    """What is known of a cue that has played: when it did, and when its condition held last, ns."""
+    """What is known of a cue that has played: when it did, when its condition held last, and if it was felt."""
 
     played_ns: int
     held_ns: int
+    felt: bool = True
 
 
 @frozen(kw_only=True)
@@ -52,6 +53,7 @@ class Schedule:
 
     Attributes:
         playing: What is on the glove, None if it is free.
+        cue: The cue that this is, None for a state of the formation.
         gate_ns: When the gate opens.
         silent_ns: How long a state without a side closes the gate: as long as the last pattern did.
         told: What plays, or closed the gate: wishing for it meanwhile is no news.
@@ -60,6 +62,7 @@ class Schedule:
     """
 
     playing: Request | None = None
+    cue: Cue | None = None
     gate_ns: int = 0
     silent_ns: int = 0
     told: str | None = None
@@ -87,6 +90,7 @@ def decide(
     now_ns: int,
     *,
     silent: bool = False,
+    connected: bool = True,
 ) -> tuple[Schedule, Decision]:
     """Decides what to play.
 
@@ -96,6 +100,7 @@ def decide(
         cues: The conditions that hold, the most urgent first, with their patterns.
         now_ns: The time.
         silent: The state would have a pattern if it had a side; it restarts an open gate (`flight-2018`).
+        connected: Whether patterns can be felt.
 
     Returns:
         The scheduler, with what is to be played as playing, and the decision.
@@ -105,10 +110,11 @@ def decide(
         return _miss(schedule, wish), Decision()
     for cue, request in cues:
         last = schedule.reminders.get(cue)
-        if last is None or now_ns >= last.played_ns + REMIND_NS:
+        rest_ns = RETRY_NS if last and not last.felt and connected else REMIND_NS
+        if last is None or now_ns >= last.played_ns + rest_ns:
             reminders = {**schedule.reminders, cue: Reminder(now_ns, now_ns)}
             schedule = evolve(_miss(schedule, wish), told=None, reminders=reminders)
-            return _play(schedule, request, now_ns), Decision(play=request)
+            return _play(schedule, request, now_ns, cue), Decision(play=request)
     if now_ns < schedule.gate_ns:
         return _miss(schedule, wish), Decision()
     told = wish.pattern.name if wish else None
@@ -129,9 +135,14 @@ def started(schedule: Schedule, started_ns: int) -> Schedule:
     return evolve(schedule, gate_ns=started_ns + _gate_ns(schedule.playing))
 
 
-def ended(schedule: Schedule) -> Schedule:
-    """Notes that the glove is free again, because the pattern has ended or failed."""
-    return evolve(schedule, playing=None)
+def ended(schedule: Schedule, *, felt: bool) -> Schedule:
+    """Notes that the glove is free again, because the pattern has ended, or failed."""
+    reminder = schedule.reminders.get(schedule.cue) if schedule.cue else None
+    if schedule.cue and reminder and not felt:
+        schedule = evolve(
+            schedule, reminders={**schedule.reminders, schedule.cue: reminder._replace(felt=False)}
+        )
+    return evolve(schedule, playing=None, cue=None)
 
 
 def _lasting(reminders: Mapping[Cue, Reminder], holding: Sequence[Cue], now_ns: int) -> dict[Cue, Reminder]:
@@ -140,9 +151,9 @@ def _lasting(reminders: Mapping[Cue, Reminder], holding: Sequence[Cue], now_ns: 
     return {cue: last for cue, last in seen.items() if now_ns - last.held_ns < CLEAR_NS}
 
 
-def _play(schedule: Schedule, request: Request, now_ns: int) -> Schedule:
+def _play(schedule: Schedule, request: Request, now_ns: int, cue: Cue | None = None) -> Schedule:
     """Puts a pattern on the glove; the gate closes even if it never starts."""
-    return evolve(schedule, playing=request, gate_ns=now_ns + _gate_ns(request))
+    return evolve(schedule, playing=request, cue=cue, gate_ns=now_ns + _gate_ns(request))
 
 
 def _gate_ns(request: Request) -> int:

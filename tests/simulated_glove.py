@@ -61,6 +61,11 @@ class Device:
         """What the motors get."""
         return self.log[-1][1] if self.log else OFF
 
+    @property
+    def obeys(self) -> bool:
+        """Whether a session is open."""
+        return self._nonce is not None
+
     def tick(self, now_ns: int) -> None:
         """Moves on: dead-man and frames."""
         if self._nonce is not None and now_ns - self._obeyed_ns >= self._deadman_ns:

@@ -1,6 +1,7 @@
 """`swarmtouch glove calibrate`: asks what each motor does, and writes what the glove then plays by."""
 
 import argparse
+import threading
 import time
 from collections.abc import Callable
 from datetime import date
@@ -11,6 +12,7 @@ from deploy.glove.device import worn_on_serial
 from glove_bridge.calibration import HIGHEST_SUPPLY_V, LONGEST_KICK_MS, Calibration, Motor, wire_duty
 from glove_bridge.calibration_file import load_calibration, save_calibration
 from glove_bridge.gloves.serial import SerialGlove
+from glove_bridge.gloves.serial_link import Order
 from glove_bridge.patterns.schema import FINGERS
 from glove_bridge.session import Session
 from shared.errors import ConfigError, DeviceError
@@ -21,6 +23,9 @@ SHARES = (0.25, 0.6, 1.0)
 """Where between start and limit the frequency is measured."""
 LOWEST_HZ, HIGHEST_HZ = 20.0, 500.0
 """What a motor may be measured at."""
+
+OBEYED_S = 2.0
+"""A glove that has not obeyed after so long is gone."""
 
 NAMES = ("thumb", "index", "middle", "ring", "little finger")
 
@@ -71,15 +76,32 @@ class Bench:
         Raises:
             DeviceError: The glove is not there.
         """
-        if not self.glove.connected:
-            raise DeviceError(f"the glove went away: {self.glove.link.session.fault}")
         duties = tuple(wire_duty(duty) if f == finger else 0 for f in FINGERS)
-        self.glove.link.order(lambda session, now_ns: session.hold(duties, now_ns))
+        self._have(lambda session, now_ns: session.hold(duties, now_ns))
 
     def rest(self) -> None:
-        """Stops every motor and waits until it rests."""
-        self.glove.link.order(Session.stop)
+        """Stops every motor and waits until it rests.
+
+        Raises:
+            DeviceError: The glove is not there.
+        """
+        self._have(Session.stop)
         time.sleep(self.turn_s / 2.0)
+
+    def _have(self, order: Order) -> None:
+        """Gives an order and waits until the device has obeyed: a motor that was not told says nothing."""
+        session = self.glove.link.session
+        given, until = threading.Event(), time.monotonic() + OBEYED_S
+
+        def give(session: Session, now_ns: int) -> None:
+            order(session, now_ns)
+            given.set()
+
+        self.glove.link.order(give)
+        while not (given.is_set() and session.quiet) and time.monotonic() < until:
+            time.sleep(0.001)
+        if session.fault or not session.quiet:
+            raise DeviceError(f"the glove went away: {session.fault or 'no answer'}")
 
     def number(self, question: str, default: float, low: float, high: float) -> float:
         """Asks for a number until it is one between `low` and `high`."""

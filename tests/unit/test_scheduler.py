@@ -10,7 +10,17 @@ from hypothesis import strategies as st
 from glove_bridge.cues import Cue, active_cues
 from glove_bridge.patterns import load_patterns
 from glove_bridge.patterns.schema import CUE_PATTERNS
-from glove_bridge.scheduler import CLEAR_NS, REMIND_NS, Decision, Request, Schedule, decide, ended, started
+from glove_bridge.scheduler import (
+    CLEAR_NS,
+    REMIND_NS,
+    RETRY_NS,
+    Decision,
+    Request,
+    Schedule,
+    decide,
+    ended,
+    started,
+)
 from shared.messages import NO_FLAGS, ORIGIN, DroneState, Flag, Mode
 
 MS = 1_000_000
@@ -36,7 +46,7 @@ class Player:
     def at(self, now_ms: int, wish: str | None = None, *cues: Cue, silent: bool = False) -> Decision:
         self.now_ms = now_ms
         if self.ends_ms is not None and now_ms >= self.ends_ms:
-            self.schedule, self.ends_ms = ended(self.schedule), None
+            self.schedule, self.ends_ms = ended(self.schedule, felt=True), None
             self.ended.append(now_ms)
         wanted = request(wish) if wish else None
         due = [(cue, request(cue.pattern)) for cue in cues]
@@ -99,7 +109,7 @@ def test_the_wish_that_plays_is_not_suppressed_by_flickering() -> None:
 def test_the_gate_counts_from_the_first_frame_not_from_the_decision() -> None:
     schedule, decision = decide(Schedule(), request("CR"), [], 0)
     assert decision.play
-    schedule = ended(started(schedule, 140 * MS))
+    schedule = ended(started(schedule, 140 * MS), felt=True)
     assert decide(schedule, request("CR"), [], 939 * MS)[1].play is None
     assert decide(schedule, request("CR"), [], 940 * MS)[1].play == request("CR")
 
@@ -107,7 +117,7 @@ def test_the_gate_counts_from_the_first_frame_not_from_the_decision() -> None:
 def test_a_glove_that_fails_is_not_asked_again_before_the_gate_opens() -> None:
     schedule, decision = decide(Schedule(), request("CR"), [], 0)
     assert decision.play
-    schedule = ended(schedule)
+    schedule = ended(schedule, felt=True)
     assert decide(schedule, request("CR"), [], 799 * MS)[1].play is None
     assert decide(schedule, request("CR"), [], 800 * MS)[1].play == request("CR")
 
@@ -261,3 +271,32 @@ def test_a_critical_battery_is_a_low_one() -> None:
     assert active_cues({1: state(1, flags=Flag.CRITICAL_BATTERY)}, (), hand_stale=False) == (
         Cue("LOW_BATTERY"),
     )
+
+
+def played_while(*, connected_from_ns: int, until_ns: int) -> list[int]:
+    """When a lasting cue is played on a glove that fails every pattern until it is there, ns."""
+    schedule, times, lost = Schedule(), [], Cue("DRONE_LOST", 2)
+    for now_ns in range(0, until_ns, 50 * MS):
+        connected = now_ns >= connected_from_ns
+        schedule, decision = decide(
+            schedule, None, [(lost, request("DRONE_LOST"))], now_ns, connected=connected
+        )
+        if decision.play:
+            times.append(now_ns)
+            schedule = ended(schedule, felt=connected)
+    return times
+
+
+def test_a_cue_that_was_not_felt_is_felt_as_soon_as_the_glove_is_there() -> None:
+    back_ns = REMIND_NS // 2
+    assert played_while(connected_from_ns=back_ns, until_ns=REMIND_NS + back_ns) == [0, back_ns]
+    soon_ns = RETRY_NS // 2
+    assert played_while(connected_from_ns=soon_ns, until_ns=REMIND_NS) == [0, RETRY_NS]
+
+
+def test_without_a_glove_a_cue_is_asked_for_no_more_often_than_with_one() -> None:
+    assert played_while(connected_from_ns=10 * REMIND_NS, until_ns=3 * REMIND_NS) == [
+        0,
+        REMIND_NS,
+        2 * REMIND_NS,
+    ]

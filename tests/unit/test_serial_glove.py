@@ -1,6 +1,7 @@
 """The serial glove on a simulated device that vanishes, comes back, and loses frames: in real time."""
 
 import statistics
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -100,6 +101,27 @@ def test_no_call_blocks_while_the_line_is_dead(device: SimulatedGlove) -> None:
         assert ended(glove).count("started") == 0
     # Waiting for one answer would take 60 ms; the median leaves out what a busy machine does.
     assert statistics.median(took_s) < 0.02
+
+
+def test_a_line_that_hangs_ends_its_patterns_and_nothing_is_played_late(
+    device: SimulatedGlove, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("glove_bridge.gloves.serial.OVERDUE_NS", 0)
+    goes_on = threading.Event()
+    with closing(opened(device)) as glove:
+        until(lambda: glove.connected)
+        glove.link.order(lambda *_: goes_on.wait(LIMIT_S))
+        begun_ns = time.monotonic_ns()
+        glove.play(RIGHT, begun_ns)
+        assert ended(glove) == ["failed"]
+        assert time.monotonic_ns() - begun_ns >= RIGHT.length_ms * 1_000_000
+        assert glove.fault == "its line hangs"
+        monkeypatch.undo()
+        goes_on.set()
+        until(lambda: device.device.obeys and not glove.poll(time.monotonic_ns()) and glove.connected)
+        glove.play(RIGHT, time.monotonic_ns())
+        assert ended(glove) == ["started", "finished"]
+        assert len(device.device.plays) == 1, "the first one would have been about the past"
 
 
 def test_closing_silences_the_motors_at_once(device: SimulatedGlove) -> None:
