@@ -131,7 +131,7 @@ def run_freely(flight: Recorded) -> list[Event]:
     schedule, events, ends_ns = Schedule(), list[Event](), 0
     for tick_ns, reading in zip(flight.tick_ns.tolist(), read_all(flight), strict=True):
         if schedule.playing and tick_ns >= ends_ns:
-            schedule = ended(schedule)
+            schedule = ended(schedule, felt=True)
         name = advice_pattern(reading)
         wish = Request(pattern=PATTERNS.patterns[name], state_seq=0) if name else None
         schedule, decision = decide(schedule, wish, [], tick_ns, silent=reading.extent != 0)

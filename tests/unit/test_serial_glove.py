@@ -108,9 +108,13 @@ def test_a_line_that_hangs_ends_its_patterns_and_nothing_is_played_late(
 ) -> None:
     monkeypatch.setattr("glove_bridge.gloves.serial.OVERDUE_NS", 0)
     goes_on = threading.Event()
+
+    def hang(*_: object) -> None:
+        goes_on.wait(LIMIT_S)
+
     with closing(opened(device)) as glove:
         until(lambda: glove.connected)
-        glove.link.order(lambda *_: goes_on.wait(LIMIT_S))
+        glove.link.order(hang)
         begun_ns = time.monotonic_ns()
         glove.play(RIGHT, begun_ns)
         assert ended(glove) == ["failed"]
