@@ -7,6 +7,7 @@ from pathlib import Path
 from deploy.doctor.finding import Finding, bad, good, warning
 from deploy.net import FOLDER
 from shared.errors import ConfigError
+from shared.net.anchors import check_issued
 from shared.net.keyring import Keyring
 from shared.scenario import Scenario
 
@@ -37,7 +38,8 @@ def _certificates(
     try:
         from deploy.net.authority import WARN_DAYS, issued  # noqa: PLC0415  cryptography is an extra
 
-        certificates = issued(Keyring(folder))
+        keyring = Keyring(folder)
+        certificates = issued(keyring)
     except ConfigError as error:
         yield grave(f"keys in {folder}", str(error), "swarmtouch net keys init, then issue; or copy them here")
         return
@@ -51,6 +53,11 @@ def _certificates(
             whole = "make the swarm's keys anew: swarmtouch net keys init with another --keys"
             finding = grave if left < 0 else warning
             yield finding(f"certificate {each.name}", ends, again if each.is_member else whole)
+        elif each.is_member:
+            try:
+                check_issued(keyring.certificate(each.name), keyring.authority, each.name)
+            except ConfigError as error:
+                yield grave(f"certificate {each.name}", str(error), "as it says")
 
 
 def _modes(folder: Path) -> Iterator[Finding]:

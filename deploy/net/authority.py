@@ -14,6 +14,7 @@ import tomli_w
 from attrs import frozen
 
 from shared.errors import ConfigError
+from shared.net.anchors import issuer_of
 from shared.net.keyring import MEMBERS_FILE, Keyring, stem
 
 try:
@@ -78,7 +79,7 @@ def create(keyring: Keyring, swarm: str) -> None:
         .issuer_name(name)
         .public_key(key.public_key())
         .serial_number(x509.random_serial_number())
-        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=1), critical=True)
         .add_extension(_usage(signs_certificates=True), critical=True)
         .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
         .sign(key, hashes.SHA256())
@@ -111,7 +112,7 @@ def issue(keyring: Keyring, node: str, hosts: Sequence[str] = ()) -> None:
     certificate = (
         _validity(x509.CertificateBuilder(), NODE_DAYS)
         .subject_name(_name(node))
-        .issuer_name(authority.subject)
+        .issuer_name(issuer_of(authority.subject, node))
         .public_key(key.public_key())
         .serial_number(x509.random_serial_number())
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
@@ -126,8 +127,28 @@ def issue(keyring: Keyring, node: str, hosts: Sequence[str] = ()) -> None:
         .sign(authority_key, hashes.SHA256())
     )
     _write(keyring.key(node), _private_pem(key), _SECRET)
-    _write(keyring.certificate(node), certificate.public_bytes(serialization.Encoding.PEM), _PUBLIC)
+    chain = (certificate, _issuer(authority, authority_key, node))
+    pem = b"".join(each.public_bytes(serialization.Encoding.PEM) for each in chain)
+    _write(keyring.certificate(node), pem, _PUBLIC)
     _write_members(keyring, dict.fromkeys((*keyring.members(), node)))
+
+
+def _issuer(
+    authority: x509.Certificate, authority_key: ec.EllipticCurvePrivateKey, node: str
+) -> x509.Certificate:
+    """Makes the link between a node's certificate and the authority, for those who trust the latter as such."""
+    return (
+        x509.CertificateBuilder()
+        .subject_name(issuer_of(authority.subject, node))
+        .issuer_name(authority.subject)
+        .public_key(authority_key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(authority.not_valid_before_utc)
+        .not_valid_after(authority.not_valid_after_utc)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(_usage(signs_certificates=True), critical=True)
+        .sign(authority_key, hashes.SHA256())
+    )
 
 
 def remove(keyring: Keyring, node: str) -> None:

@@ -44,6 +44,11 @@ def _names(node: str) -> list[tuple[str, str]]:
     return [(role, number or "0")]
 
 
+def others(node: str, members: Iterable[str]) -> list[str]:
+    """Returns the members that a node has to do with: there may be several observers, and one of all else."""
+    return [member for member in members if member != node or node == OBSERVER]
+
+
 def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
     """Builds the access rules that one node enforces.
 
@@ -55,13 +60,12 @@ def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
     Returns:
         Zenoh's `access_control` section. What is not allowed is dropped on arrival.
     """
-    # There may be several observers, which hear each other's status.
-    others = [member for member in members if member != node or node == OBSERVER]
+    speakers = others(node, members)
     rules = [_rule("out", ["**"], [*HEARING, "put", "reply", "liveliness_token"], "egress")]
     policies = [{"rules": ["out"], "subjects": ["anyone"]}]
     heard = [f"{swarm}/{key}" for key in (*(topic.wildcard for topic in TOPICS), "alive/**")]
     rules.append(_rule("hear", heard, list(HEARING), "ingress"))
-    for member in others:
+    for member in speakers:
         granted = ["hear"] if member != RELAY else []
         if node != RELAY:
             granted += [f"put {member}", f"alive {member}"]
@@ -72,7 +76,7 @@ def access_control(swarm: str, node: str, members: Iterable[str]) -> Rules:
         if granted:
             policies.append({"rules": granted, "subjects": [member]})
     subjects: list[Mapping[str, Any]] = [{"id": "anyone"}]
-    subjects += [{"id": member, "cert_common_names": [member]} for member in others]
+    subjects += [{"id": member, "cert_common_names": [member]} for member in speakers]
     return {
         "enabled": True,
         "default_permission": "deny",

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from shared.clock import NS_PER_S
+from shared.nodes import OBSERVER
 
 LOG_FILTER = "error,zenoh::net::routing::interceptor=trace,zenoh_link_commons=warn,zenoh_link_tls=warn"
 """Zenoh's log level under which refusals are told."""
@@ -20,10 +21,16 @@ MAX_NAMES = 16
 MAX_NAME = 70
 """So is the key that they try: longer ones are cut, for a status has to stay small enough to be heard."""
 MAX_IDENTITIES = 256
+MOST_SESSIONS = 8
+"""At once, of one member with one node: one is in use, and those of processes that were killed go within the
+lease. Who has more is about to take all the places that a node has, and is told of."""
+MOST_OBSERVERS = 32
+"""Any number of observers share one name."""
 OTHERS = "others"
 LINKED, REFUSED = "linked ", "refused "
 """What the numbers begin with; the rest is the name."""
 TOO_LARGE = "too large"
+CROWD = "more links than one node needs"
 STRANGER = "a node without a certificate of ours"
 
 _DECISION = re.compile(
@@ -45,7 +52,7 @@ class Audit:
         self._members = frozenset(members)
         self._lock = threading.Lock()
         self._names: dict[str, str] = {}
-        self._present: set[str] = set()
+        self._present: dict[str, str] = {}
         self._decided: dict[str, str] = {}
         self._refused: Counter[str] = Counter()
         self._told: Counter[str] = Counter()
@@ -62,13 +69,16 @@ class Audit:
         name = name or STRANGER
         with self._lock:
             if not present:
-                self._present.discard(identity)
+                self._present.pop(identity, None)
                 return
             is_new = identity not in self._present
-            self._present.add(identity)
+            self._present[identity] = name
             self._remember(identity, name)
             if is_new and name not in self._members:
                 self._count(name)
+            most = MOST_OBSERVERS if name == OBSERVER else MOST_SESSIONS
+            if is_new and list(self._present.values()).count(name) > most:
+                self._count(f"{name}, {CROWD}")
 
     def read(self, text: str) -> None:
         """Takes in a piece of Zenoh's log, whole lines."""
@@ -90,7 +100,7 @@ class Audit:
     def metrics(self) -> dict[str, float]:
         """Returns who is linked and how often whom was refused, as numbers for a process's status."""
         with self._lock:
-            links = Counter(self._names.get(identity, STRANGER) for identity in self._present)
+            links = Counter(self._present.values())
             named = {f"{LINKED}{name}": float(n) for name, n in links.most_common(MAX_NAMES)}
             return named | {f"{REFUSED}{who}": float(n) for who, n in self._refused.items()}
 

@@ -12,7 +12,8 @@ from typing import Any
 
 from shared.errors import ConfigError
 from shared.formation import Formation
-from shared.net.access import access_control, deaf
+from shared.net.access import access_control, deaf, others
+from shared.net.anchors import check_issued, trust_anchors
 from shared.net.keyring import Keyring, require
 from shared.nodes import RELAY, dials, endpoint
 from shared.scenario import Scenario
@@ -153,8 +154,10 @@ def _secure(settings: Settings, keyring: Keyring, swarm: str, node: str) -> None
     """Adds mutual TLS, access rules and guards."""
     hint = f"issue it with swarmtouch net keys issue {node}, or copy it here from where keys are issued"
     certificate, key = require(keyring.certificate(node), hint), require(keyring.key(node), hint)
+    authority, members = Path(require(keyring.authority, hint)), keyring.members()
+    check_issued(Path(certificate), authority, node)
     settings["transport"]["link"]["tls"] = {
-        "root_ca_certificate": require(keyring.authority, hint),
+        "root_ca_certificate_base64": trust_anchors(authority, others(node, members)),
         "enable_mtls": True,
         "verify_name_on_connect": True,
         "close_link_on_expiration": True,
@@ -171,7 +174,7 @@ def _secure(settings: Settings, keyring: Keyring, swarm: str, node: str) -> None
         )
     settings["transport"]["link"]["protocols"] = sorted(protocols)
     settings["transport"]["link"]["rx"] = {"max_message_size": MAX_MESSAGE_BYTES}
-    settings["access_control"] = access_control(swarm, node, keyring.members())
+    settings["access_control"] = access_control(swarm, node, members)
     settings["low_pass_filter"] = [
         {
             "id": "small",

@@ -53,6 +53,17 @@ def test_an_authority_that_ends_takes_every_certificate_along(keyring: Keyring) 
     assert "anew" in authority.advice
 
 
+def test_a_certificate_that_nobody_would_trust_is_told(keyring: Keyring) -> None:
+    issue(keyring, "drone/2")
+    other = Keyring(keyring.folder.parent / "others")
+    create(other, "line")
+    issue(other, "drone/2")
+    keyring.certificate("drone/2").write_bytes(other.certificate("drone/2").read_bytes())
+    told = findings(keyring)["certificate drone/2"]
+    assert told.verdict is Verdict.BAD
+    assert "issue it anew" in told.found
+
+
 def test_secrets_that_others_may_read_are_told_one_by_one(keyring: Keyring) -> None:
     keyring.hand_private.chmod(0o640)
     keyring.folder.chmod(0o755)

@@ -1,5 +1,6 @@
 """The swarm's own authority: what is issued, who may read it, who is a member."""
 
+import base64
 import datetime
 import stat
 from pathlib import Path
@@ -10,6 +11,7 @@ from cryptography import x509
 from deploy.cli import main
 from deploy.net.authority import NODE_DAYS, WARN_DAYS, create, issue, issued, remove
 from shared.errors import ConfigError
+from shared.net.anchors import trust_anchors
 from shared.net.keyring import Keyring
 
 
@@ -30,12 +32,32 @@ def test_private_keys_are_readable_by_their_owner_only(keyring: Keyring) -> None
 
 def test_a_certificate_names_its_node_and_its_hosts_and_is_signed_by_the_authority(keyring: Keyring) -> None:
     issue(keyring, "drone/2", ["10.0.0.2", "drone2.local"])
-    certificate = x509.load_pem_x509_certificate(keyring.certificate("drone/2").read_bytes())
+    certificate, issuer = x509.load_pem_x509_certificates(keyring.certificate("drone/2").read_bytes())
     authority = x509.load_pem_x509_certificate(keyring.authority.read_bytes())
-    certificate.verify_directly_issued_by(authority)
+    certificate.verify_directly_issued_by(issuer)
+    issuer.verify_directly_issued_by(authority)
     _, drone = issued(keyring)
     assert (drone.name, drone.is_member, drone.has_key) == ("drone/2", True, True)
     assert set(drone.hosts) == {"localhost", "127.0.0.1", "10.0.0.2", "drone2.local"}
+
+
+def test_a_node_trusts_the_authority_in_the_names_of_the_members_only(keyring: Keyring) -> None:
+    for node in ("drone/1", "drone/2"):
+        issue(keyring, node)
+    pem = base64.b64decode(trust_anchors(keyring.authority, ["drone/2", "relay"]))
+    authority = x509.load_pem_x509_certificate(keyring.authority.read_bytes())
+    anchors = x509.load_pem_x509_certificates(pem)
+    assert all(anchor.public_key() == authority.public_key() for anchor in anchors)
+    trusted = {anchor.subject for anchor in anchors}
+    leaves = {
+        node: x509.load_pem_x509_certificate(keyring.certificate(node).read_bytes())
+        for node in ("drone/1", "drone/2")
+    }
+    assert {node: leaf.issuer in trusted for node, leaf in leaves.items()} == {
+        "drone/1": False,
+        "drone/2": True,
+    }
+    assert authority.subject not in trusted
 
 
 def test_an_ending_certificate_is_noticed(keyring: Keyring) -> None:

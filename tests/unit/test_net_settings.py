@@ -1,6 +1,7 @@
 """Zenoh's configuration of any node in any profile, and the access rules in it."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -70,6 +71,17 @@ def test_every_topic_has_somebody_who_may_write_it() -> None:
     written = {key for node in NODES for key in writes(node)}
     for topic in TOPICS:
         assert written & {topic.key(id=1, role="drone"), topic.key(id=0, role="relay")}, topic.pattern
+
+
+def test_a_certificate_that_nobody_would_trust_is_refused_with_what_to_do(
+    field: Scenario, tmp_path: Path
+) -> None:
+    folder = shutil.copytree(field.net.keys, tmp_path / "keys")
+    for suffix in ("crt", "key"):
+        shutil.copy(folder / f"drone-3.{suffix}", folder / f"drone-2.{suffix}")
+    scenario = load_scenario("rhombus", ["net.profile=field", f"net.keys={folder}"])
+    with pytest.raises(ConfigError, match=r"drone-2\.crt: not issued by .* net keys issue SCENARIO drone/2"):
+        node_settings(scenario, RHOMBUS, "drone/2")
 
 
 def test_the_field_has_certificates_rules_and_guards(field: Scenario) -> None:
