@@ -12,7 +12,7 @@ from shared.clock import NS_PER_S
 from shared.scenario import Rates
 
 FALLBACK_PERIODS = 1.5
-"""Without its inputs an agent steps after this many control periods; at 1.0 jitter would cause extra steps."""
+"""Without its inputs an agent steps after this many periods; at 1.0 jitter would cause extra steps."""
 
 
 @frozen
@@ -31,10 +31,13 @@ class Due(NamedTuple):
 
 
 def step_rule(rates: Rates) -> StepRule:
-    """Returns the bounds for the rates of a scenario."""
+    """Returns the bounds for the rates of a scenario.
+
+    An agent steps at the rate of the hand, be it slower than `control_hz`; without a hand at its own.
+    """
     return StepRule(
         shortest=round(NS_PER_S / rates.max_control_hz),
-        longest=round(NS_PER_S * FALLBACK_PERIODS / rates.control_hz),
+        longest=round(NS_PER_S * FALLBACK_PERIODS / min(rates.control_hz, rates.hand_hz)),
     )
 
 

@@ -33,7 +33,15 @@ def main() -> int:
             closing(_open_hand(arguments, clock())) as source,
         ):
             orders = OrderReader(sys.stdin.fileno() if sys.stdin else None)
-            run(source, orders.wait, bus, clock, stopping, hand_signer(scenario.net))
+            run(
+                source,
+                orders.wait,
+                bus,
+                clock,
+                stopping,
+                hand_signer(scenario.net),
+                scenario.rates.hand_hz,
+            )
     except SwarmTouchError as error:
         return explain("relay", error)
     return 0

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from msgspec.structs import replace
 
-from human_relay.relay import IMPOSSIBLE_POSE, RelayState, has_news, make_sample, order, repeat_ns
+from human_relay.relay import IMPOSSIBLE_POSE, RelayState, due_ns, make_sample, order
 from human_relay.sources.base import HandPose, HandSource
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
@@ -31,8 +31,11 @@ def run(
     clock: Clock,
     stopping: threading.Event,
     sign: Sign | None = None,
+    hand_hz: float = HAND.rate_hz,
 ) -> None:
     """Relays until told to stop: each pose of the source once, at its time, and repeats while it is silent.
+
+    Of a source that has more poses than `hand_hz` the newest are sent.
 
     Args:
         source: The hand.
@@ -41,10 +44,11 @@ def run(
         clock: Clock of the process, the one that the source was opened with.
         stopping: Ends the loop.
         sign: Signs each sample, where the swarm has keys.
+        hand_hz: Samples per second.
     """
     publish = bus.publisher(HAND)
     status = StatusReporter(bus, RELAY, 0, clock)
-    state = RelayState(epoch=clock())
+    state = RelayState(epoch=clock(), period_ns=round(NS_PER_S / hand_hz))
     ordered: list[Wish] = []
     rejected, complain_ns = 0, 0
 
@@ -57,7 +61,7 @@ def run(
         for wish in ordered:
             state = order(state, wish)
         offered = source.poll(now)
-        if ordered or has_news(state, offered) or now >= repeat_ns(state):
+        if ordered or now >= due_ns(state, offered):
             state, sample = make_sample(state, offered, now, finished=source.finished)
             if offered and state.rejected > rejected and now >= complain_ns:
                 _complain(offered, state.rejected)
@@ -65,7 +69,7 @@ def run(
             rejected = state.rejected
             publish(sign(encode(replace(sample, signature=blank()))) if sign else encode(sample))
         report("running")
-        wake_ns = min(source.next_ns(now), repeat_ns(state))
+        wake_ns = min(source.next_ns(now), due_ns(state, offered))
         ordered = wait((wake_ns - clock()) / NS_PER_S)
     report("ending", force=True)
 

@@ -43,6 +43,9 @@ class RelayState(NamedTuple):
         fresh_ns: When the last new pose was sent.
         sent_ns: When the last sample was sent.
         rejected: Samples in which the source's pose was replaced because it was impossible.
+        period_ns: Between two samples, if the source has so many poses or more (`rates.hand_hz`).
+        next_ns: When the next pose is due if the source has more; on average, not for each.
+        judged_ns: `t_ns` of the last pose that was offered, be it impossible.
     """
 
     epoch: int
@@ -54,6 +57,9 @@ class RelayState(NamedTuple):
     fresh_ns: int = 0
     sent_ns: int = 0
     rejected: int = 0
+    period_ns: int = PERIOD_NS
+    next_ns: int = 0
+    judged_ns: int | None = None
 
 
 def order(state: RelayState, wish: Wish) -> RelayState:
@@ -79,7 +85,28 @@ def has_news(state: RelayState, offered: HandPose | None) -> bool:
 
 def repeat_ns(state: RelayState) -> int:
     """Returns when a sample is due even if the source offers nothing new."""
-    return max(state.fresh_ns + PATIENCE_NS, state.sent_ns + PERIOD_NS)
+    patience_ns = max(PATIENCE_NS, 5 * state.period_ns // 2)
+    return max(state.fresh_ns + patience_ns, state.sent_ns + state.period_ns)
+
+
+def due_ns(state: RelayState, offered: HandPose | None) -> int:
+    """Returns when the next sample is due; of the poses that a fast source has until then, the newest is sent.
+
+    A pose that changes the wish is due at once. Any other may come half a period early, as long as the rate is
+    kept on average, so a source at about this rate does not wait, whatever its jitter; what comes earlier gives
+    way to a newer one.
+    """
+    repeated_ns = repeat_ns(state)
+    if offered is None:
+        # A hand that was let go is said as soon as it cannot be a lost frame, at any rate.
+        is_said = state.sent_ns > state.fresh_ns
+        return repeated_ns if is_said else min(repeated_ns, state.fresh_ns + PATIENCE_NS)
+    if not has_news(state, offered) or offered.t_ns == state.judged_ns:
+        return repeated_ns
+    if state.pose is None or offered.mode is not state.pose.mode:
+        return 0
+    early_ns = state.next_ns - state.period_ns // 2
+    return min(repeated_ns, early_ns if offered.t_ns >= early_ns else early_ns + state.period_ns)
 
 
 def make_sample(
@@ -119,7 +146,9 @@ def make_sample(
     )
     # A STOP is final wherever it came from.
     override = Wish.STOP if wish is Wish.STOP else state.override
-    return state._replace(seq=state.seq + 1, sent_ns=now_ns, override=override), sample
+    judged_ns = offered.t_ns if offered is not None else state.judged_ns
+    state = state._replace(seq=state.seq + 1, sent_ns=now_ns, override=override, judged_ns=judged_ns)
+    return state, sample
 
 
 def _take(state: RelayState, offered: HandPose, now_ns: int) -> RelayState:
@@ -129,7 +158,10 @@ def _take(state: RelayState, offered: HandPose, now_ns: int) -> RelayState:
         return state._replace(velocity=ORIGIN) if is_stale else state
     dt = (offered.t_ns - state.pose.t_ns) / NS_PER_S if state.pose else 0.0
     estimator, velocity = step(state.estimator, offered.position, dt)
-    return state._replace(pose=offered, velocity=velocity, estimator=estimator, fresh_ns=now_ns)
+    next_ns = max(state.next_ns, now_ns) + state.period_ns
+    return state._replace(
+        pose=offered, velocity=velocity, estimator=estimator, fresh_ns=now_ns, next_ns=next_ns
+    )
 
 
 def _is_possible(state: RelayState, offered: HandPose) -> bool:

@@ -6,9 +6,12 @@ from attrs import Attribute, Factory, field, frozen
 from attrs.validators import optional
 
 from shared.messages import MAX_DRONE_ID
+from shared.order import FASTEST_HZ
 from shared.pointer_link import DEFAULT_PORT
 
 MAX_PORT = 65_535
+SLOWEST_HAND = 10.0
+"""A hand is stale after 0.25 s: at this rate one sample may be lost, Hz."""
 
 Law = Literal["paper", "stable"]
 Profile = Literal["laptop", "compose", "field", "radio"]
@@ -23,6 +26,14 @@ def _positive(_: Any, attribute: "Attribute[Any]", value: float) -> None:
 def _not_negative(_: Any, attribute: "Attribute[Any]", value: float) -> None:
     if not value >= 0:
         raise ValueError(f"{attribute.name} must be >= 0, not {value!r}")
+
+
+def _hand_rate(_: Any, attribute: "Attribute[Any]", value: float) -> None:
+    if not SLOWEST_HAND <= value <= FASTEST_HZ:
+        raise ValueError(
+            f"{attribute.name} must be {SLOWEST_HAND:g} to {FASTEST_HZ} Hz, not {value!r}:"
+            " a slower hand is stale before the next sample comes"
+        )
 
 
 def _port(_: Any, attribute: "Attribute[Any]", value: int) -> None:
@@ -68,11 +79,17 @@ class Swarm:
 
 @frozen(kw_only=True)
 class Rates:
-    """`[rates]`: Hz."""
+    """`[rates]`: Hz.
+
+    Attributes:
+        control_hz: Agents step so often without a hand, and simulators with one.
+        max_control_hz: No agent steps more often, however many samples come.
+        hand_hz: The relay sends no more poses of the hand than these, the newest; agents step at it.
+    """
 
     control_hz: float = field(default=60.0, validator=_positive)
     max_control_hz: float = field(default=120.0, validator=_positive)
-    hand_hz: float = field(default=60.0, validator=_positive)
+    hand_hz: float = field(default=60.0, validator=_hand_rate)
 
 
 @frozen(kw_only=True)

@@ -1,4 +1,5 @@
 import itertools
+import random
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 from human_relay.loop import run
 from human_relay.relay import IMPOSSIBLE_POSE
 from human_relay.sources import open_source
+from human_relay.sources.base import HandPose
 from shared.clock import NS_PER_S
 from shared.codec import decode
 from shared.memory_bus import MemoryBus, MemoryNetwork
@@ -60,6 +62,75 @@ def test_every_sample_of_the_source_is_sent_once_at_its_time() -> None:
     assert [sample.seq for sample in samples] == list(range(180))
     assert [sample.stamp_ns for sample in samples] == [START + k * NS_PER_S // 60 for k in range(180)]
     assert {sample.epoch for sample in samples} == {START}
+
+
+class Steady:
+    """A source with a pose per period, some of them a little late."""
+
+    def __init__(self, rate_hz: float, jitter_s: float = 0.0, stop_s: float = 1e9) -> None:
+        self._rate_hz, self._jitter_s, self._stop_s = rate_hz, jitter_s, stop_s
+        self._random = random.Random(1)
+        self._upcoming = (0, START)
+        self._current: HandPose | None = None
+        self.finished = False
+        self.remarks = ()
+
+    def poll(self, now_ns: int) -> HandPose | None:
+        number, at_ns = self._upcoming
+        while now_ns >= at_ns:
+            seconds = number / self._rate_hz
+            mode = Wish.STOP if seconds >= self._stop_s else Wish.FLY
+            self._current = HandPose(position=(0.1 * seconds, 0.0, 1.2), yaw=0.0, mode=mode, t_ns=at_ns)
+            number += 1
+            late_s = self._random.uniform(0.0, self._jitter_s)
+            at_ns = START + round((number / self._rate_hz + late_s) * NS_PER_S)
+        self._upcoming = (number, at_ns)
+        return self._current
+
+    def next_ns(self, _: int) -> int:
+        return self._upcoming[1]
+
+    def close(self) -> None:
+        pass
+
+
+def relay_of(source: Steady, hand_hz: float, seconds: float = 10.0) -> list[HandSample]:
+    operator, network = Operator(seconds), MemoryNetwork()
+    inbox = Inbox(operator.clock, depth=100_000)
+    MemoryBus(network).subscribe(HAND.wildcard, inbox)
+    bus = MemoryBus(network)
+    run(source, operator.wait, bus, operator.clock, operator.stopping, hand_hz=hand_hz)
+    return [decode(arrival.payload, HandSample) for arrival in inbox.take()[HAND.pattern]]
+
+
+@pytest.mark.parametrize("hand_hz", [10.0, 20.0, 60.0, 100.0])
+@pytest.mark.parametrize("source_hz", [90.0, 120.0, 240.0, 1000.0])
+def test_a_fast_source_is_thinned_out_to_the_rate_of_the_hand_and_the_newest_pose_wins(
+    source_hz: float, hand_hz: float
+) -> None:
+    samples = relay_of(Steady(source_hz, jitter_s=0.3 / source_hz), hand_hz)
+    wanted = 10.0 * min(hand_hz, source_hz)
+    assert 0.92 * wanted <= len(samples) <= 1.02 * wanted
+    ages = [(s.stamp_ns - START) / NS_PER_S - s.position[0] / 0.1 for s in samples]
+    assert max(ages) < 1.5 / source_hz
+    gaps = [(b.stamp_ns - a.stamp_ns) / NS_PER_S for a, b in itertools.pairwise(samples)]
+    assert max(gaps) < 1.0 / hand_hz + 1.6 / source_hz
+
+
+@pytest.mark.parametrize("source_hz", [30.0, 59.9, 60.0, 60.1])
+def test_a_source_at_about_the_rate_of_the_hand_never_waits(source_hz: float) -> None:
+    jitter_s = 0.3 / source_hz
+    samples = relay_of(Steady(source_hz, jitter_s), 60.0)
+    fresh = {s.position: s for s in reversed(samples)}
+    waited = [s.stamp_ns - START - round(s.position[0] / 0.1 * NS_PER_S) for s in fresh.values()]
+    assert sum(wait > jitter_s * NS_PER_S + 1_000 for wait in waited) <= 5
+    assert max(waited) < 1.1 / 60.0 * NS_PER_S
+    assert len(fresh) >= 10.0 * min(source_hz, 60.0) - 3
+
+
+def test_a_wish_is_never_thinned_out() -> None:
+    (first, *_) = [s for s in relay_of(Steady(1000.0, stop_s=5.003), 10.0) if s.mode is Wish.STOP]
+    assert (first.stamp_ns - START) / NS_PER_S == pytest.approx(5.003, abs=1e-6)
 
 
 def test_after_the_end_it_says_land_at_60_hz() -> None:

@@ -15,6 +15,12 @@ def test_the_bounds_are_120_hz_and_one_and_a_half_periods() -> None:
     assert rule == StepRule(shortest=8_333_333, longest=25 * MS)
 
 
+def test_with_a_slower_hand_it_steps_at_the_rate_of_the_hand() -> None:
+    assert step_rule(Rates(hand_hz=30.0)).longest == 50 * MS
+    assert step_rule(Rates(control_hz=30.0)).longest == 50 * MS
+    assert step_rule(Rates(hand_hz=100.0)) == step_rule(Rates())
+
+
 def test_with_its_inputs_it_steps_as_soon_as_it_may_else_at_the_latest() -> None:
     rule = StepRule(shortest=8 * MS, longest=25 * MS)
     assert due_ns(rule, 100 * MS, inputs_complete=True) == 108 * MS
