@@ -15,6 +15,8 @@ BRIDGE = "bridge"
 OBSERVER = "observer"
 CONSOLE = "console"
 
+LOOPBACK = "127.0.0.1"
+
 NEAR = 1.5
 """Drones that rest within this distance link to each other, m."""
 
@@ -45,7 +47,7 @@ def endpoint(scenario: Scenario, formation: Formation, node: str) -> str:
 
 def loopback(net: Net, port: int) -> str:
     """Returns the endpoint of a port on this machine: QUIC where there are keys, else TCP."""
-    return f"quic/127.0.0.1:{port}?mixed_rel=1" if net.keys else f"tcp/127.0.0.1:{port}"
+    return f"quic/{LOOPBACK}:{port}?mixed_rel=1" if net.keys else f"tcp/{LOOPBACK}:{port}"
 
 
 def dials(scenario: Scenario, formation: Formation, node: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""The datagrams between a console and the relay's `pointer://` source; they stay on one machine.
+"""The datagrams between a console and the relay's `pointer://` source, on a socket of their user alone.
 
 | bytes | content |
 |---|---|
@@ -19,8 +19,8 @@ from typing import NamedTuple
 from shared.errors import DecodeError
 from shared.messages import MAX_POSITION, ORIGIN, Vector, Wish
 
-DEFAULT_PORT = 7459
-LOOPBACK = "127.0.0.1"
+DEFAULT_SOCKET = "pointer.sock"
+"""Name of the socket unless another is chosen (`shared.private_socket`)."""
 
 REPEAT_S = 0.05
 SILENT_S = 0.3

@@ -7,7 +7,7 @@ from attrs.validators import optional
 
 from shared.messages import MAX_DRONE_ID
 from shared.order import FASTEST_HZ
-from shared.pointer_link import DEFAULT_PORT
+from shared.pointer_link import DEFAULT_SOCKET
 
 MAX_PORT = 65_535
 SLOWEST_HAND = 10.0
@@ -34,11 +34,6 @@ def _hand_rate(_: Any, attribute: "Attribute[Any]", value: float) -> None:
             f"{attribute.name} must be {SLOWEST_HAND:g} to {FASTEST_HZ} Hz, not {value!r}:"
             " a slower hand is stale before the next sample comes"
         )
-
-
-def _port(_: Any, attribute: "Attribute[Any]", value: int) -> None:
-    if not 0 <= value <= MAX_PORT:
-        raise ValueError(f"{attribute.name} must be a port from 0 to {MAX_PORT}, not {value!r}")
 
 
 def _check_box(low: "Triple | Pair", high: "Triple | Pair") -> None:
@@ -354,7 +349,8 @@ class Net:
         interface: Network interface of the radio, for example `wlan0`.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
         full_mesh: Up to this many drones everyone links to everyone; of more, only those who must.
-        pointer_port: Loopback UDP port where the relay's `pointer://` source hears consoles; 0: it has none.
+        pointer: Unix socket where the relay's `pointer://` source hears consoles: an absolute path, or a name
+            in a folder that only their user can enter; empty: it has none.
     """
 
     profile: Profile = "laptop"
@@ -367,7 +363,7 @@ class Net:
     interface: str = "lo"
     adminspace: bool = False
     full_mesh: int = field(default=16, validator=_not_negative)
-    pointer_port: int = field(default=DEFAULT_PORT, validator=_port)
+    pointer: str = DEFAULT_SOCKET
 
 
 @frozen(kw_only=True)

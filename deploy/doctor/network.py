@@ -14,8 +14,7 @@ from shared.clock import Clock, system_clock
 from shared.errors import DeviceError
 from shared.formation import build_formation
 from shared.net.settings import peer_settings
-from shared.nodes import all_nodes
-from shared.pointer_link import LOOPBACK
+from shared.nodes import LOOPBACK, all_nodes
 from shared.radio import Receiver, Transmitter
 from shared.radio_link import radio_group
 from shared.scenario import Scenario

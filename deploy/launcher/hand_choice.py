@@ -1,12 +1,14 @@
 """How the relay of a flight gets its hand: from the source that the user names, from a pointer, or both."""
 
-from urllib.parse import urlencode
+import os
+from pathlib import Path
+from urllib.parse import quote, urlencode
 
 from attrs import evolve, frozen
 
 from human_relay.sources import open_source
-from human_relay.sources.pointer import pointer_address
-from shared.pointer_link import LOOPBACK
+from human_relay.sources.pointer import pointer_socket
+from shared.private_socket import private_path
 from shared.scenario import Scenario
 from shared.uri import parse_uri
 
@@ -22,43 +24,49 @@ class HandChoice:
     Attributes:
         uri: Hand source of the relay.
         takeover: Pointer that may take it over, None for none.
-        pointer_port: UDP port of the pointer, 0 without one.
+        pointer: Socket of the pointer, empty without one.
     """
 
     uri: str
     takeover: str | None = None
-    pointer_port: int = 0
+    pointer: str = ""
 
 
-def choose_hand(uri: str, scenario: Scenario, *, console: bool, free_port: int) -> HandChoice:
+def choose_hand(uri: str, scenario: Scenario, *, console: bool) -> HandChoice:
     """Completes what the user asked for.
 
     Args:
-        uri: The hand source; `pointer://` needs no address.
+        uri: The hand source; `pointer://` needs no socket.
         scenario: Whose `[hand]` says how fast the mapped hand follows: a pointer moves the hand no faster.
         console: Whether pages may take over any other hand.
-        free_port: UDP port for a pointer without an address.
 
     Raises:
         ConfigError: The source is refused; so nothing is started for it.
-        DeviceError: The port that it names is in use.
+        DeviceError: Another relay listens on the socket that it names, or there can be no socket.
     """
     parsed = parse_uri(uri, example="scripted:tour?peak=0.4")
+    choice = HandChoice(uri=uri)
     if parsed.scheme == POINTER:
-        _, port = pointer_address(parsed) if parsed.path else (LOOPBACK, free_port)
+        named = private_path(pointer_socket(parsed)) if parsed.path else _own_socket()
         options = {"speed": f"{_speed(scenario):g}", **parsed.options}
-        choice = HandChoice(uri=_pointer_uri(port, options), pointer_port=port)
-    else:
-        choice = HandChoice(uri=uri)
-        if console:
-            takeover = _pointer_uri(free_port, {"speed": f"{_speed(scenario):g}"})
-            choice = evolve(choice, takeover=takeover, pointer_port=free_port)
-    open_source(choice.uri, start_ns=0).close()
+        choice = HandChoice(uri=_pointer_uri(named, options), pointer=str(named))
+    elif console:
+        own = _own_socket()
+        takeover = _pointer_uri(own, {"speed": f"{_speed(scenario):g}"})
+        choice = evolve(choice, takeover=takeover, pointer=str(own))
+    for source in (choice.uri, choice.takeover):
+        if source:
+            open_source(source, start_ns=0).close()
     return choice
 
 
-def _pointer_uri(port: int, options: dict[str, str]) -> str:
-    return f"{POINTER}://{LOOPBACK}:{port}?{urlencode(options)}"
+def _own_socket() -> Path:
+    """Every flight has one of its own, wherever its processes are started from."""
+    return private_path(f"pointer-{os.getpid()}.sock")
+
+
+def _pointer_uri(socket: Path, options: dict[str, str]) -> str:
+    return f"{POINTER}://{quote(str(socket))}?{urlencode(options)}"
 
 
 def _speed(scenario: Scenario) -> float:

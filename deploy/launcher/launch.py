@@ -40,8 +40,7 @@ from shared.compiled import form
 from shared.config import dump_scenario
 from shared.errors import ConfigError
 from shared.formation import Formation
-from shared.nodes import OBSERVER, all_nodes
-from shared.pointer_link import LOOPBACK
+from shared.nodes import LOOPBACK, OBSERVER, all_nodes
 from shared.scenario import Scenario
 from shared.scenario_check.check import open_scenario
 
@@ -126,9 +125,9 @@ def _resolve(options: Options) -> tuple[Scenario, Formation, HandChoice]:
         load_patterns(options.glove.patterns)
     hints = hint_overrides(source_hints(options.hand))
     scenario, formation = open_scenario(options.scenario, (*hints, *options.overrides))
-    tcp_ports, (udp_port, pointer_port) = free_ports(tcp=len(all_nodes(formation)), udp=2)
-    hand = choose_hand(options.hand, scenario, console=options.console, free_port=pointer_port)
-    return resolve_scenario(scenario, formation, tcp_ports, udp_port, hand.pointer_port), formation, hand
+    tcp_ports, (udp_port,) = free_ports(tcp=len(all_nodes(formation)), udp=1)
+    hand = choose_hand(options.hand, scenario, console=options.console)
+    return resolve_scenario(scenario, formation, tcp_ports, udp_port, hand.pointer), formation, hand
 
 
 async def _fly(

@@ -4,7 +4,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-_LOOPBACK = "127.0.0.1"
+from shared.nodes import LOOPBACK
 
 
 def free_ports(tcp: int, udp: int) -> tuple[list[int], list[int]]:
@@ -29,7 +29,7 @@ def free_ports(tcp: int, udp: int) -> tuple[list[int], list[int]]:
 def free_port_near(preferred: int) -> int:
     """Returns the preferred TCP port on loopback if nothing listens there, else any free one."""
     try:
-        with socket.create_server((_LOOPBACK, preferred)):
+        with socket.create_server((LOOPBACK, preferred)):
             return preferred
     except OSError:
         (port,), _ = free_ports(tcp=1, udp=0)
@@ -39,5 +39,5 @@ def free_port_near(preferred: int) -> int:
 @contextmanager
 def _bound(kind: socket.SocketKind) -> Iterator[int]:
     with socket.socket(socket.AF_INET, kind) as opened:
-        opened.bind((_LOOPBACK, 0))
+        opened.bind((LOOPBACK, 0))
         yield opened.getsockname()[1]

@@ -136,7 +136,7 @@ def resolve_scenario(
     formation: Formation,
     tcp_ports: Sequence[int],
     udp_port: int,
-    pointer_port: int = 0,
+    pointer: str = "",
 ) -> Scenario:
     """Fills in the addresses that the scenario leaves open.
 
@@ -145,7 +145,7 @@ def resolve_scenario(
         formation: Its formation.
         tcp_ports: A free port on loopback for every node of `all_nodes(formation)`.
         udp_port: A free port on loopback for the simulated world.
-        pointer_port: Port of the relay's pointer, 0 if it has none.
+        pointer: Socket of the relay's pointer, empty if it has none.
 
     Returns:
         The scenario with an endpoint for every node and an address for the vehicles; what it names stays.
@@ -164,7 +164,7 @@ def resolve_scenario(
             scenario.net,
             endpoints={} if scenario.net.router else {**free, **scenario.net.endpoints},
             multicast=multicast,
-            pointer_port=pointer_port,
+            pointer=pointer,
         ),
         vehicles=attrs.evolve(scenario.vehicles, all=attrs.evolve(everyone, uri=uri)),
     )

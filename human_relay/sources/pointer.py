@@ -1,22 +1,23 @@
-"""A hand that a console points with: `pointer://HOST:PORT?speed=..&acceleration=..`, loopback only.
+"""A hand that a console points with: `pointer://SOCKET?speed=..&acceleration=..`, on the same machine.
 
-Datagrams are those of `shared.pointer_link`. The hand is released when its holder says so or is silent for
-0.3 s; it then stays where it is, and the relay says HOLD. `speed` (m/s) and `acceleration` (m/s^2) bound it.
+Datagrams are those of `shared.pointer_link`, on a socket that no other user can reach. SOCKET is a name, or an
+absolute path (`pointer:///run/swarmtouch/pointer.sock`); it may be left out. The hand is released when its
+holder says so or is silent for 0.3 s; it then stays where it is, and the relay says HOLD. `speed` (m/s) and
+`acceleration` (m/s^2) bound it.
 """
 
-import ipaddress
 import logging
-import socket
-from urllib.parse import urlsplit
+from pathlib import Path
 
 from attrs import evolve
 
 from human_relay.pointing import Limits, PointerState, advance, hear, is_watched
 from human_relay.sources.base import HandPose
 from human_relay.sources.playback import PERIOD_NS
-from shared.errors import ConfigError, DecodeError, DeviceError
+from shared.errors import ConfigError, DecodeError
 from shared.messages import NO_HAND, Wish
-from shared.pointer_link import DEFAULT_PORT, LOOPBACK, MAX_DATAGRAM, decode_pointed
+from shared.pointer_link import DEFAULT_SOCKET, MAX_DATAGRAM, decode_pointed
+from shared.private_socket import PrivateListener, private_path
 from shared.uri import Uri
 
 SPEED = 0.75
@@ -35,34 +36,22 @@ class PointerHand:
         """Listens at once.
 
         Raises:
-            ConfigError: Unknown option, a value out of range, or an address that is not on loopback.
-            DeviceError: The port is in use.
+            ConfigError: Unknown option, a value out of range, or no name of a socket.
+            DeviceError: Another relay listens there.
         """
-        host, port = pointer_address(uri)
+        name = pointer_socket(uri)
         self._limits = _limits(uri)
         self._state = PointerState(moved_ns=start_ns)
         self._due_ns = start_ns
         self._rejected = 0
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        try:
-            self._socket.bind((host, port))
-        except OSError as error:
-            self._socket.close()
-            raise DeviceError(f"{uri.text}: cannot listen: {error}; is another relay running?") from error
+        self._listener = PrivateListener(private_path(name))
 
     @staticmethod
     def hints(uri: Uri) -> dict[str, object]:
         """A pointer points in the world frame: it says nothing about the mapping."""
-        pointer_address(uri)
+        pointer_socket(uri)
         _limits(uri)
         return {}
-
-    @property
-    def port(self) -> int:
-        """UDP port that it listens on."""
-        port: int = self._socket.getsockname()[1]
-        return port
 
     @property
     def finished(self) -> bool:
@@ -99,13 +88,12 @@ class PointerHand:
 
     def close(self) -> None:
         """Stops listening."""
-        self._socket.close()
+        self._listener.close()
 
     def _receive(self, now_ns: int) -> None:
         for _ in range(_MOST_DATAGRAMS):
-            try:
-                datagram = self._socket.recv(MAX_DATAGRAM)
-            except OSError:  # nothing more, or closed
+            datagram = self._listener.receive(MAX_DATAGRAM)
+            if datagram is None:
                 return
             try:
                 self._state = hear(self._state, decode_pointed(datagram), now_ns)
@@ -123,21 +111,16 @@ def _limits(uri: Uri) -> Limits:
     )
 
 
-def pointer_address(uri: Uri) -> tuple[str, int]:
-    """Returns host and port that a pointer listens on.
+def pointer_socket(uri: Uri) -> str:
+    """Returns name or absolute path of the socket that a pointer listens on.
 
     Raises:
-        ConfigError: It is no IPv4 address on loopback.
+        ConfigError: It is neither.
     """
-    try:
-        parts = urlsplit(f"//{uri.path}")
-        host, port = parts.hostname or LOOPBACK, DEFAULT_PORT if parts.port is None else parts.port
-        is_loopback = ipaddress.IPv4Address(host).is_loopback and not parts.path
-    except ValueError:
-        is_loopback = False
-    if not is_loopback:
+    name = uri.path or DEFAULT_SOCKET
+    if "\0" in name or not (Path(name).is_absolute() or (name == Path(name).name and ":" not in name)):
         raise ConfigError(
-            f"{uri.text}: expected an IPv4 address on loopback, for example pointer://{LOOPBACK}:{DEFAULT_PORT};"
-            " whoever can reach this port can fly"
+            f"{uri.text}: a pointer is heard on a socket of this machine: expected pointer://, pointer://NAME"
+            " or pointer:///ABSOLUTE/PATH"
         )
-    return host, port
+    return name

@@ -64,14 +64,14 @@ def open_takeover(uri: str, pointer: str, start_ns: int) -> HandSource:
 
     Args:
         uri: Of the source that plays first.
-        pointer: URI of the pointer, for example `pointer://127.0.0.1:7459`.
+        pointer: URI of the pointer, for example `pointer://`.
         start_ns: When the sources' own time starts, on the clock of the process.
 
     Raises:
         ConfigError: As for `open_source`, or the pointer is none.
         DeviceError: As for `open_source`.
     """
-    parsed = parse_uri(pointer, example="pointer://127.0.0.1:7440")
+    parsed = parse_uri(pointer, example="pointer://")
     if parsed.scheme != "pointer":
         raise ConfigError(f"{pointer}: only a pointer can take over, for example pointer://")
     return Takeover(open_source(uri, start_ns), PointerHand(parsed, start_ns))

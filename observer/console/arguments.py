@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from observer.console import PORT
-from shared.pointer_link import LOOPBACK
+from shared.nodes import LOOPBACK
 
 TOKEN_VARIABLE = "SWARMTOUCH_CONSOLE_TOKEN"  # noqa: S105  the name of a variable, no token
 RANDOM_TOKEN = "random"  # noqa: S105  a word, no token

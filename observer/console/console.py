@@ -37,8 +37,8 @@ _NOTICE_PERIOD_NS = NS_PER_S // 10
 _REPEAT_NS = round(REPEAT_S * NS_PER_S)
 _VERBS = {Wish.GROUND: Verb.GROUND, Wish.FLY: Verb.FLY, Wish.HOLD: Verb.HOLD}
 
-Point = Callable[[bytes], object]
-"""Sends one datagram towards the relay; raises nothing."""
+Point = Callable[[bytes], str]
+"""Sends one datagram towards the relay; returns why nobody hears it, empty if somebody does; raises nothing."""
 
 
 class Console:
@@ -76,6 +76,7 @@ class Console:
         self._links: dict[int, PageLink] = {}
         self._opened = 0
         self._control: Json = {}
+        self._unheard = ""
         self._notices = view.notices(clock())
         self._health_ns = self._notice_ns = self._pointed_ns = 0
 
@@ -94,7 +95,7 @@ class Console:
         for message in (
             {**self._scene, "you": link.number},
             self._control,
-            self.view.notices(now),
+            self._current_notices(now),
             self.view.health(now),
             self.view.playing(now),
             self.view.snapshot(now),
@@ -140,7 +141,7 @@ class Console:
     def _tell_slow_news(self, now: int) -> None:
         if now - self._notice_ns >= _NOTICE_PERIOD_NS:
             self._notice_ns = now
-            current = self.view.notices(now)
+            current = self._current_notices(now)
             if current != self._notices:
                 self._notices = current
                 self._tell(current)
@@ -185,12 +186,22 @@ class Console:
         owner = self._owner
         self._pointed_ns = now
         if owner.stopped:
-            self._point(encode_pointed(Pointed(self._sender, Verb.STOP)))
+            pointed = Pointed(self._sender, Verb.STOP)
         elif owner.holder is not None:
-            position = self._target(owner.point)
-            self._point(encode_pointed(Pointed(self._sender, _VERBS[owner.wish], position, owner.yaw)))
+            pointed = Pointed(self._sender, _VERBS[owner.wish], self._target(owner.point), owner.yaw)
         elif owner.pages:
-            self._point(encode_pointed(Pointed(self._sender, Verb.RELEASED)))
+            pointed = Pointed(self._sender, Verb.RELEASED)
+        else:
+            return
+        self._unheard = self._point(encode_pointed(pointed))
+
+    def _current_notices(self, now: int) -> Json:
+        """What the swarm gives cause for, and first of all whether the page that steers is heard."""
+        message = self.view.notices(now)
+        if self._unheard and (self._owner.holder is not None or self._owner.stopped):
+            unheard = {"level": "alarm", "text": f"no relay hears this page: {self._unheard}"}
+            message["notices"] = [unheard, *message["notices"]]
+        return message
 
     def _target(self, point: Vector | None) -> Vector:
         """Returns where to point; until the holder has said so, where the hand is."""

@@ -59,7 +59,7 @@ def scene(scenario: Scenario, formation: Formation, hand: HandMap) -> Json:
         "version": PROTOCOL_VERSION,
         "swarm": scenario.swarm.name,
         "law": scenario.swarm.law,
-        "can_steer": scenario.net.pointer_port > 0,
+        "can_steer": bool(scenario.net.pointer),
         "hand": {
             "start": hand.start,
             "low": _vector(hand.low),

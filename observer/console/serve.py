@@ -28,7 +28,8 @@ from observer.swarm import open_observer
 from shared.clock import system_clock
 from shared.errors import ConfigError, DeviceError
 from shared.formation import build_formation
-from shared.pointer_link import LOOPBACK
+from shared.nodes import LOOPBACK
+from shared.private_socket import PrivateSender
 from shared.process import LAUNCHER_PID
 from shared.scenario import Scenario
 from shared.transport import Inbox
@@ -74,7 +75,10 @@ def serve(options: Options, stopping: threading.Event) -> None:
         )
     pair = certificate(options.tls, options.host) if options.tls else None
     patterns = read_patterns(options.patterns) if options.patterns else NO_PATTERNS
-    with _listening(options.host, options.port) as listener, _pointer(options.scenario) as pointer:
+    with (
+        _listening(options.host, options.port) as listener,
+        contextlib.closing(PrivateSender(options.scenario.net.pointer)) as pointer,
+    ):
         # Answered on standard output for people and for programs that start a console.
         # Under a launcher that is a log file, and logs keep no secrets.
         shown = None if LAUNCHER_PID in os.environ else token
@@ -112,7 +116,7 @@ async def _serve(
     options: Options,
     patterns: Patterns,
     listener: socket.socket,
-    pointer: "_PointerSocket",
+    pointer: PrivateSender,
     token: str | None,
     pair: tuple[Path, Path] | None,
     stopping: threading.Event,
@@ -159,33 +163,6 @@ def _config(console: Console, token: str | None, pair: tuple[Path, Path] | None)
         timeout_graceful_shutdown=1,
         **tls,
     )
-
-
-class _PointerSocket:
-    """Sends datagrams to the relay's pointer; whether anybody listens is not known.
-
-    Args:
-        port: UDP port on loopback, 0 for nowhere.
-    """
-
-    def __init__(self, port: int) -> None:
-        self._to = (LOOPBACK, port)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-
-    def send(self, datagram: bytes) -> None:
-        if self._to[1]:
-            with contextlib.suppress(
-                OSError
-            ):  # the relay is not there, or its buffer is full: the next one counts
-                self._socket.sendto(datagram, self._to)
-
-    def close(self) -> None:
-        self._socket.close()
-
-
-def _pointer(scenario: Scenario) -> "contextlib.closing[_PointerSocket]":
-    return contextlib.closing(_PointerSocket(scenario.net.pointer_port))
 
 
 @contextlib.contextmanager

@@ -29,6 +29,8 @@ from shared.toml_text import parse_toml
 
 _LARGEST_RECORD = 1 << 28
 _LONGEST_COUNT = 20
+_RETIRED = (("net", "pointer_port"),)
+"""Keys of the scenario that earlier recorders wrote, and that mean nothing any more."""
 _DAMAGE = (MemoryError, OverflowError, McapError, ZstdError, struct.error, ValueError, RuntimeError)
 
 
@@ -170,9 +172,13 @@ def _head(file: Path) -> dict[str, dict[str, str]]:
 
 def _scenario(metadata: dict[str, dict[str, str]], file: Path) -> Scenario:
     try:
-        return structure_scenario(parse_toml(metadata[SCENARIO]["toml"], str(file)), str(file))
+        tree = parse_toml(metadata[SCENARIO]["toml"], str(file))
     except KeyError as error:
         raise ConfigError(f"{file}: not a trace of a swarm: it holds no scenario") from error
+    for table, key in _RETIRED:
+        if isinstance(tree.get(table), dict):
+            tree[table].pop(key, None)
+    return structure_scenario(tree, str(file))
 
 
 def _count(text: str) -> int:

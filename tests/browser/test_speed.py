@@ -55,9 +55,9 @@ def test_the_page_keeps_up_with_a_flight_of_eight(browser: Browser, tmp_path: Pa
 def test_the_page_itself_draws_many_drones(browser: Browser, tmp_path: Path, drones: int) -> None:
     raw = load_scenario("grid", [f"formation.n={drones}"])
     formation = build_formation(raw)
-    tcp, (udp, pointer) = free_ports(tcp=len(all_nodes(formation)), udp=2)
+    tcp, (udp,) = free_ports(tcp=len(all_nodes(formation)), udp=1)
     file = tmp_path / "scenario.toml"
-    file.write_text(dump_scenario(resolve_scenario(raw, formation, tcp, udp, pointer)))
+    file.write_text(dump_scenario(resolve_scenario(raw, formation, tcp, udp, "pointer.sock")))
     swarm = subprocess.Popen([sys.executable, "-m", "tests.browser.stand_in", str(file)])
     try:
         with another_console(file, tmp_path) as url:

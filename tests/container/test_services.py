@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.container, pytest.mark.timeout(600)]
 
 UNITS = ROOT / "deploy/systemd"
 AGENT = "swarmtouch-agent@1"
-SERVICES = (AGENT, "swarmtouch-relay", "swarmtouch-glove", "swarmtouch-observer")
+SERVICES = (AGENT, "swarmtouch-relay", "swarmtouch-console", "swarmtouch-glove", "swarmtouch-observer")
 MACHINE = "swarmtouch-test-machine"
 WAIT_S = 60.0
 

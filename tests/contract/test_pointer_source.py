@@ -2,9 +2,9 @@
 
 import itertools
 import math
-import socket
-from collections.abc import Iterator
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from pathlib import Path
 
 import pytest
 
@@ -16,6 +16,7 @@ from shared.clock import NS_PER_S
 from shared.errors import ConfigError, DeviceError
 from shared.messages import Vector, Wish
 from shared.pointer_link import Pointed, Verb, encode_pointed
+from shared.private_socket import PrivateSender
 from shared.uri import parse_uri
 
 START = 5_000 * NS_PER_S
@@ -26,14 +27,13 @@ HOME: Vector = (0.5, 0.0, 1.2)
 class Hand:
     """A source, and somebody who points; its time is the test's."""
 
-    def __init__(self, source: HandSource, port: int) -> None:
+    def __init__(self, source: HandSource, path: Path) -> None:
         self.source = source
         self.now = START
-        self._port = port
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._sender = PrivateSender(str(path))
 
     def send(self, datagram: bytes) -> None:
-        self._socket.sendto(datagram, ("127.0.0.1", self._port))
+        assert self._sender.send(datagram) == ""
 
     def point(self, verb: Verb = Verb.FLY, position: Vector = HOME, sender: int = 7) -> None:
         self.send(encode_pointed(Pointed(sender, verb, position)))
@@ -62,19 +62,30 @@ class Hand:
 
     def close(self) -> None:
         self.source.close()
-        self._socket.close()
+        self._sender.close()
 
 
 @pytest.fixture
-def hand() -> Iterator[Hand]:
-    pointer = PointerHand(parse_uri("pointer://127.0.0.1:0?speed=1", example=""), START)
-    with closing(Hand(pointer, pointer.port)) as opened:
+def path(short_path: Path) -> Path:
+    return short_path / "pointer.sock"
+
+
+def pointer_at(path: Path) -> PointerHand:
+    return PointerHand(parse_uri(f"pointer://{path}?speed=1", example=""), START)
+
+
+@pytest.fixture
+def hand(path: Path) -> Iterator[Hand]:
+    with closing(Hand(pointer_at(path), path)) as opened:
         yield opened
 
 
-def takeover(first: str) -> Hand:
-    pointer = PointerHand(parse_uri("pointer://127.0.0.1:0?speed=1", example=""), START)
-    return Hand(Takeover(open_source(first, START), pointer), pointer.port)
+@pytest.fixture
+def takeover(path: Path) -> Iterator[Callable[[str], Hand]]:
+    with ExitStack() as opened:
+        yield lambda first: opened.enter_context(
+            closing(Hand(Takeover(open_source(first, START), pointer_at(path)), path))
+        )
 
 
 def test_there_is_no_hand_until_somebody_points(hand: Hand) -> None:
@@ -154,20 +165,19 @@ def test_it_closes_twice_and_has_no_hand_then(hand: Hand) -> None:
     assert hand.rest(1.0) is None
 
 
-def test_a_taken_port_is_said() -> None:
-    pointer = PointerHand(parse_uri("pointer://127.0.0.1:0", example=""), START)
-    with closing(pointer), pytest.raises(DeviceError, match="is another relay running"):
-        open_source(f"pointer://127.0.0.1:{pointer.port}", START)
+def test_a_taken_socket_is_said(path: Path) -> None:
+    with closing(pointer_at(path)), pytest.raises(DeviceError, match="is another relay running"):
+        open_source(f"pointer://{path}", START)
 
 
 @pytest.mark.parametrize(
     ("uri", "expected"),
     [
-        ("pointer://0.0.0.0:7459", "expected an IPv4 address on loopback"),
-        ("pointer://192.168.0.1:1", "whoever can reach this port can fly"),
-        ("pointer://localhost:1", "expected an IPv4 address"),
-        ("pointer://127.0.0.1:99999", "expected an IPv4 address"),
-        ("pointer://127.0.0.1:1/x", "expected an IPv4 address"),
+        ("pointer://0.0.0.0:7459", "a pointer is heard on a socket of this machine"),
+        ("pointer://127.0.0.1:7459", "expected pointer://, pointer://NAME or pointer:///ABSOLUTE/PATH"),
+        ("pointer://../elsewhere", "expected pointer://"),
+        ("pointer://a/b", "expected pointer://"),
+        ("pointer:///a%00b", "expected pointer://"),
         ("pointer://?speed=9", "speed=9 must be a number from 0.01 to 3"),
         ("pointer://?gain=2", "unknown option 'gain'"),
     ],
@@ -179,38 +189,38 @@ def test_a_wrong_uri_is_refused_with_a_hint(uri: str, expected: str) -> None:
         assert expected in str(refused.value)
 
 
-def test_a_script_plays_until_somebody_takes_the_hand() -> None:
-    with closing(takeover("scripted:tour?lead=0")) as hand:
-        played = hand.rest(2.0)
-        assert played is not None
-        assert played.mode is Wish.FLY
-        taken = hand.hold(0.1, position=(-1.0, 0.0, 1.2))
-        assert math.dist(taken[0].position, played.position) < 0.05, "no jump"
-        assert not hand.source.finished
-        assert hand.rest(1.0) is None, "the script does not come back"
+def test_a_script_plays_until_somebody_takes_the_hand(takeover: Callable[[str], Hand]) -> None:
+    hand = takeover("scripted:tour?lead=0")
+    played = hand.rest(2.0)
+    assert played is not None
+    assert played.mode is Wish.FLY
+    taken = hand.hold(0.1, position=(-1.0, 0.0, 1.2))
+    assert math.dist(taken[0].position, played.position) < 0.05, "no jump"
+    assert not hand.source.finished
+    assert hand.rest(1.0) is None, "the script does not come back"
 
 
-def test_a_script_that_nobody_watches_lands() -> None:
-    with closing(takeover("scripted:tour?lead=0&duration=1")) as hand:
-        last = hand.rest(1.5)
-        assert last is not None
-        assert last.mode is Wish.LAND
-        assert hand.source.finished
-        assert hand.hold(0.2)[-1].mode is Wish.LAND, "an end is an end"
-        hand.point(Verb.STOP)
-        stopped = hand.poll()
-        assert stopped is not None
-        assert stopped.mode is Wish.STOP
+def test_a_script_that_nobody_watches_lands(takeover: Callable[[str], Hand]) -> None:
+    hand = takeover("scripted:tour?lead=0&duration=1")
+    last = hand.rest(1.5)
+    assert last is not None
+    assert last.mode is Wish.LAND
+    assert hand.source.finished
+    assert hand.hold(0.2)[-1].mode is Wish.LAND, "an end is an end"
+    hand.point(Verb.STOP)
+    stopped = hand.poll()
+    assert stopped is not None
+    assert stopped.mode is Wish.STOP
 
 
-def test_a_script_that_is_watched_waits_for_a_hand() -> None:
-    with closing(takeover("scripted:tour?lead=0&duration=1")) as hand:
-        while hand.now < START + 2 * NS_PER_S:
-            hand.point(Verb.RELEASED)
-            pose = hand.poll()
-        assert pose is None
-        assert not hand.source.finished
-        assert hand.hold(0.2)[-1].mode is Wish.FLY
+def test_a_script_that_is_watched_waits_for_a_hand(takeover: Callable[[str], Hand]) -> None:
+    hand = takeover("scripted:tour?lead=0&duration=1")
+    while hand.now < START + 2 * NS_PER_S:
+        hand.point(Verb.RELEASED)
+        pose = hand.poll()
+    assert pose is None
+    assert not hand.source.finished
+    assert hand.hold(0.2)[-1].mode is Wish.FLY
 
 
 def test_only_a_pointer_takes_over() -> None:

@@ -29,7 +29,7 @@ from glove_bridge.patterns import FOLDER, load_patterns
 from glove_bridge.protocol import PROTOCOL, Ack, Hello, HelloReply, Message, Ping, Play, Set, Stop
 from glove_bridge.session import Session
 from human_relay.pointing import PointerState, hear
-from human_relay.sources.pointer import pointer_address
+from human_relay.sources.pointer import pointer_socket
 from human_relay.sources.recording import read_csv, relative_yaw
 from observer.console import protocol as page
 from observer.console.access import is_own_host, is_same_site, is_token
@@ -222,7 +222,7 @@ def _radio(data: bytes) -> object:
 def _uri(data: bytes) -> object:
     uri = parse_uri(_argument(data), example="pointer://")
     uri.number("speed", 1.0, low=0.0, high=4.0)
-    return [part(uri) for part in (pointer_address, link_timing)]
+    return [part(uri) for part in (pointer_socket, link_timing)]
 
 
 def _headers(data: bytes) -> object:

@@ -37,7 +37,7 @@ META = {"limits_x": [-2, 2], "limits_y": [-2, 2], "base_offset_c": [0.1, 0], "po
 META |= {"triangle_height_factor": 0.86, "R_obstacles": 0.27, "run": "one"}
 PAGE_PATTERNS = {"frames": {"EI": [{"ms": 200, "hz": {"3": 150.0}}]}, "cues": ["FENCE"]}
 OVERRIDES = (b"formation.n=8", b'net.endpoints."drone/2"=tcp/10.0.0.2:7447', b"hand.home=[1.0, 2.0]")
-URIS = (b"pointer://127.0.0.1:7459?speed=0.5", b"serial:///dev/ttyACM0?baud=115200", b"recording:a%20b?lead=2")
+URIS = (b"pointer:///run/hand.sock?speed=0.5", b"serial:///dev/ttyACM0?baud=115200", b"recording:a%20b?lead=2")
 
 
 @cache

@@ -44,6 +44,7 @@ class Stage:
     def __init__(self, scenario: Scenario = RHOMBUS) -> None:
         self.now = START
         self.sent: list[Pointed] = []
+        self.deaf = ""
         formation = build_formation(scenario)
         hand = HandMap(scenario, formation)
         view = SwarmView(formation, hand, {"EI": EI}, frozenset({"DRONE_LOST"}), START)
@@ -52,7 +53,7 @@ class Stage:
             formation,
             view=view,
             hand=hand,
-            point=lambda datagram: self.sent.append(decode_pointed(datagram)),
+            point=self.point,
             sender=77,
             clock=lambda: self.now,
         )
@@ -64,6 +65,10 @@ class Stage:
         keys = {"hand": HAND.key(), "pattern": PATTERN.key(), "relay": STATUS.key(role="relay", id=0)}
         keys |= {f"drone_{i}": DRONE_STATE.key(id=i) for i in range(1, 5)}
         self.console.step({keys[name]: [Arrival(encode(m), self.now)] for name, m in messages.items()})
+
+    def point(self, datagram: bytes) -> str:
+        self.sent.append(decode_pointed(datagram))
+        return self.deaf
 
     def last(self) -> Pointed:
         """What the relay was told last."""
@@ -254,6 +259,23 @@ def test_notices_and_health_come_when_something_changes() -> None:
     assert told["health"]["processes"][0]["present"] is False
 
 
+def test_a_page_that_steers_and_is_not_heard_is_told() -> None:
+    stage = Stage()
+    link = stage.console.open()
+    stage.deaf = "nobody listens at pointer.sock"
+    stage.step(0.2)
+    assert newest(link)["notices"]["notices"] == [], "whoever only watches need not know"
+    say(stage, link, type="take")
+    say(stage, link, type="wish", wish="FLY")
+    stage.step(0.2)
+    (notice,) = newest(link)["notices"]["notices"]
+    assert notice == {"level": "alarm", "text": f"no relay hears this page: {stage.deaf}"}
+    stage.deaf = ""
+    say(stage, link, type="wish", wish="FLY")
+    stage.step(0.2)
+    assert newest(link)["notices"]["notices"] == []
+
+
 def test_a_page_that_stops_reading_is_let_go() -> None:
     link = PageLink(1)
     for _ in range(MOST_EVENTS + 1):
@@ -281,7 +303,7 @@ def test_a_mapped_hand_comes_back_from_the_real_one(name: str) -> None:
 
 
 def test_without_a_pointer_a_page_cannot_steer() -> None:
-    scenario = load_scenario("rhombus", ["net.pointer_port=0"])
+    scenario = load_scenario("rhombus", ["net.pointer="])
     formation = build_formation(scenario)
     assert scene(scenario, formation, HandMap(scenario, formation))["can_steer"] is False
 

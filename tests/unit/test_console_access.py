@@ -40,7 +40,7 @@ def console() -> Console:
     hand = HandMap(scenario, formation)
     view = SwarmView(formation, hand, {}, frozenset(), 0)
     return Console(
-        scenario, formation, view=view, hand=hand, point=lambda _: None, sender=1, clock=system_clock()
+        scenario, formation, view=view, hand=hand, point=lambda _: "", sender=1, clock=system_clock()
     )
 
 

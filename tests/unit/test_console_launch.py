@@ -1,13 +1,16 @@
 """How a flight gets its console: the hand it chooses, the rows, the pattern file."""
 
+import os
 import socket
+from contextlib import closing
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 
 from deploy.launcher.hand_choice import choose_hand
 from deploy.launcher.pattern_file import write_pattern_file
-from deploy.launcher.ports import free_port_near, free_ports
+from deploy.launcher.ports import free_port_near
 from deploy.launcher.process_table import ConsoleChoice, process_table, resolve_scenario
 from glove_bridge.patterns import CUES, load_patterns
 from observer.console.pattern_file import read_patterns
@@ -15,54 +18,59 @@ from shared.config import load_scenario
 from shared.errors import ConfigError, DeviceError
 from shared.formation import build_formation
 from shared.nodes import all_nodes
+from shared.private_socket import PrivateListener
 
 SLALOM = load_scenario("slalom")
 MAZE = load_scenario("maze")
 
 
-@pytest.fixture
-def port() -> int:
-    _, (free,) = free_ports(tcp=0, udp=1)
-    return free
+@pytest.fixture(autouse=True)
+def mine(short_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder that sockets are made in."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_path))
+    return short_path / "swarmtouch"
 
 
-def test_a_console_may_take_over_any_hand_no_faster_than_the_swarm(port: int) -> None:
-    choice = choose_hand("scripted:tour", SLALOM, console=True, free_port=port)
+def test_a_console_may_take_over_any_hand_no_faster_than_the_swarm(mine: Path) -> None:
+    choice = choose_hand("scripted:tour", SLALOM, console=True)
     assert choice.uri == "scripted:tour"
-    assert choice.takeover == f"pointer://127.0.0.1:{port}?speed=0.75"
-    assert choice.pointer_port == port
-    assert choose_hand("scripted:tour", SLALOM, console=False, free_port=port).pointer_port == 0
+    assert choice.pointer == str(mine / f"pointer-{os.getpid()}.sock")
+    assert choice.takeover == f"pointer://{choice.pointer}?speed=0.75"
+    assert choose_hand("scripted:tour", SLALOM, console=False).pointer == ""
 
 
-def test_a_pointer_needs_no_address_and_no_takeover(port: int) -> None:
+def test_a_pointer_needs_no_address_and_no_takeover(mine: Path) -> None:
     for console in (True, False):
-        choice = choose_hand("pointer://", SLALOM, console=console, free_port=port)
-        assert (choice.uri, choice.takeover) == (f"pointer://127.0.0.1:{port}?speed=0.75", None)
-        assert choice.pointer_port == port
+        choice = choose_hand("pointer://", SLALOM, console=console)
+        assert choice.pointer == str(mine / f"pointer-{os.getpid()}.sock")
+        assert (choice.uri, choice.takeover) == (f"pointer://{choice.pointer}?speed=0.75", None)
 
 
-def test_what_the_user_says_of_the_pointer_stays(port: int) -> None:
-    choice = choose_hand(f"pointer://127.0.0.1:{port}?speed=0.3", SLALOM, console=True, free_port=1)
-    assert (choice.uri, choice.pointer_port) == (f"pointer://127.0.0.1:{port}?speed=0.3", port)
+def test_what_the_user_says_of_the_pointer_stays(short_path: Path) -> None:
+    path = short_path / "a b?.sock"
+    choice = choose_hand(f"pointer://{quote(str(path))}?speed=0.3", SLALOM, console=True)
+    assert choice.pointer == str(path)
+    assert choice.uri == f"pointer://{quote(str(path))}?speed=0.3"
 
 
-def test_a_gain_slows_the_hand_down(port: int) -> None:
-    assert choose_hand("pointer://", MAZE, console=True, free_port=port).uri.endswith("speed=0.75")
+def test_a_gain_slows_the_hand_down() -> None:
+    assert choose_hand("pointer://", MAZE, console=True).uri.endswith("speed=0.75")
 
 
-def test_what_cannot_be_a_hand_is_refused(port: int) -> None:
-    with pytest.raises(ConfigError, match="loopback"):
-        choose_hand("pointer://10.0.0.1:1", SLALOM, console=True, free_port=port)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(("127.0.0.1", 0))
-        with pytest.raises(DeviceError, match="cannot listen"):
-            choose_hand(f"pointer://127.0.0.1:{taken.getsockname()[1]}", SLALOM, console=True, free_port=port)
+def test_what_cannot_be_a_hand_is_refused(short_path: Path) -> None:
+    with pytest.raises(ConfigError, match="a socket of this machine"):
+        choose_hand("pointer://10.0.0.1:1", SLALOM, console=True)
+    taken = PrivateListener(short_path / "taken.sock")
+    with closing(taken), pytest.raises(DeviceError, match="somebody listens there"):
+        choose_hand(f"pointer://{short_path}/taken.sock", SLALOM, console=True)
 
 
 def test_the_console_is_a_process_that_starts_before_the_hand() -> None:
     formation = build_formation(SLALOM)
-    scenario = resolve_scenario(SLALOM, formation, range(9001, 9001 + len(all_nodes(formation))), 9999, 8888)
-    assert scenario.net.pointer_port == 8888
+    scenario = resolve_scenario(
+        SLALOM, formation, range(9001, 9001 + len(all_nodes(formation))), 9999, "/run/x"
+    )
+    assert scenario.net.pointer == "/run/x"
     rows = process_table(
         scenario,
         formation,
@@ -80,7 +88,7 @@ def test_the_console_is_a_process_that_starts_before_the_hand() -> None:
 def test_without_a_pointer_the_resolved_scenario_says_so() -> None:
     formation = build_formation(SLALOM)
     ports = range(9001, 9001 + len(all_nodes(formation)))
-    assert resolve_scenario(SLALOM, formation, ports, 9999).net.pointer_port == 0
+    assert resolve_scenario(SLALOM, formation, ports, 9999).net.pointer == ""
 
 
 def test_the_pattern_file_has_every_pattern_and_names_the_cues(tmp_path: Path) -> None:
