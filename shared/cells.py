@@ -1,7 +1,7 @@
 """Neighbour search with a cell list: who is nearer than a reach, without looking at all pairs."""
 
 import math
-from typing import Final, final
+from typing import Final, Generic, TypeVar, final
 
 
 class Place:
@@ -14,21 +14,24 @@ class Place:
         self.y: Final = y
 
 
+P = TypeVar("P", bound=Place)
+
+
 @final
-class Cells:
+class Cells(Generic[P]):
     """Places in square cells at least as wide as the reach, so that neighbours are in the nine around one.
 
     Args:
-        places: Who is where; afterwards called by their numbers in this list.
+        places: Who is where.
         reach: m, > 0.
 
     Attributes:
-        cells: Numbers of the places in each cell, column by column.
+        cells: The places in each cell, column by column.
     """
 
-    __slots__ = ("_columns", "_low_x", "_low_y", "_places", "_reach", "_rows", "_side", "cells")
+    __slots__ = ("_columns", "_low_x", "_low_y", "_reach", "_rows", "_side", "cells")
 
-    def __init__(self, places: list[Place], reach: float) -> None:
+    def __init__(self, places: list[P], reach: float) -> None:
         low_x = low_y = math.inf
         high_x = high_y = -math.inf
         for place in places:
@@ -37,37 +40,47 @@ class Cells:
         width, height, count = max(high_x - low_x, 0.0), max(high_y - low_y, 0.0), max(float(len(places)), 1.0)
         # However far apart they are, there are no more than a few cells for each of them.
         side = max(reach, math.sqrt(width * height / count), max(width, height) / count)
-        self._places, self._reach, self._side = places, reach, side
+        self._reach, self._side = reach, side
         self._low_x, self._low_y = low_x, low_y
         self._columns = math.floor(width / side) + 1
         self._rows = math.floor(height / side) + 1
-        self.cells: list[list[int]] = [[] for _ in range(self._columns * self._rows)]
-        for number, place in enumerate(places):
-            self.cells[self._column(place) * self._rows + self._row(place)].append(number)
+        self.cells: list[list[P]] = [[] for _ in range(self._columns * self._rows)]
+        for place in places:
+            self.cells[self._column(place) * self._rows + self._row(place)].append(place)
 
-    def near(self, number: int) -> list[int]:
-        """Returns the numbers of those within reach of one of them."""
-        own = self._places[number]
+    def near(self, own: P) -> list[P]:
+        """Returns who else is within reach of one of the places."""
         column, row = self._column(own), self._row(own)
-        squared = self._reach * self._reach
-        found = []
+        x, y, squared = own.x, own.y, self._reach * self._reach
+        found: list[P] = []
         for i in range(max(column - 1, 0), min(column + 2, self._columns)):
             for j in range(max(row - 1, 0), min(row + 2, self._rows)):
-                for other in self.cells[i * self._rows + j]:
-                    place = self._places[other]
-                    dx, dy = place.x - own.x, place.y - own.y
-                    if dx * dx + dy * dy <= squared and other != number:
-                        found.append(other)
+                for place in self.cells[i * self._rows + j]:
+                    dx, dy = place.x - x, place.y - y
+                    if dx * dx + dy * dy <= squared and place is not own:
+                        found.append(place)
         return found
 
-    def _column(self, place: Place) -> int:
+    def _column(self, place: P) -> int:
         return math.floor((place.x - self._low_x) / self._side)
 
-    def _row(self, place: Place) -> int:
+    def _row(self, place: P) -> int:
         return math.floor((place.y - self._low_y) / self._side)
+
+
+@final
+class _Numbered(Place):
+    __slots__ = ("number",)
+
+    def __init__(self, number: int, x: float, y: float) -> None:
+        super().__init__(x, y)
+        self.number: Final = number
 
 
 def near_pairs(points: list[tuple[float, float]], reach: float) -> list[tuple[int, int]]:
     """Returns the pairs of points (m) within reach, by their numbers in the list, each once."""
-    cells = Cells([Place(x, y) for x, y in points], reach)
-    return [(one, other) for one in range(len(points)) for other in cells.near(one) if one < other]
+    places = [_Numbered(number, x, y) for number, (x, y) in enumerate(points)]
+    cells = Cells(places, reach)
+    return [
+        (one.number, other.number) for one in places for other in cells.near(one) if one.number < other.number
+    ]

@@ -95,6 +95,9 @@ class Threat:
         self.direction: Final = direction
 
 
+NO_THREATS: Final[list[Threat]] = []
+
+
 def repulsion(x: float, y: float, field: Field) -> Planar:
     """Returns the velocity `eta (1/rho - 1/d0) / rho^2` away from an obstacle, m/s, Eq. 16; zero out of range.
 
@@ -162,7 +165,7 @@ def threats(point: Planar, velocity: Planar, others: list[Encounter], bubble: Bu
     x, y = point
     u, v = velocity
     radius, lead = bubble.radius, bubble.lead
-    found = []
+    found = NO_THREATS
     for other in others:
         dx, dy = x - other.x, y - other.y
         du, dv = other.u - u, other.v - v
@@ -177,7 +180,8 @@ def threats(point: Planar, velocity: Planar, others: list[Encounter], bubble: Bu
         depth = radius + lead * max(closing, 0.0) - distance
         if depth > 0.0:
             needed = depth / bubble.response + max(other.u * hx + other.v * hy, 0.0)
-            found.append(Threat((hx, hy), needed, _direction(hx, hy, du, dv, closing, bubble.slip)))
+            threat = Threat((hx, hy), needed, _direction(hx, hy, du, dv, closing, bubble.slip))
+            found = [*found, threat]
     return found
 
 

@@ -28,6 +28,9 @@ LONGEST_STEP: Final = 0.05
 """A longer pause between two steps does not let the reference move further, s."""
 
 
+NOTHING: Final[list[list[Threat]]] = []
+
+
 @final
 class Columns:
     """The columns, and by which rule they are avoided.
@@ -143,7 +146,7 @@ class Surroundings:
         velocity: Own body, m/s.
         drones: Every other drone.
         silent: Those of them that have fallen silent.
-        hand: The real hand; None before the first sample.
+        hand: The real hand; nobody before the first sample.
         hand_speed: m/s.
     """
 
@@ -155,7 +158,7 @@ class Surroundings:
         velocity: Vector,
         drones: list[Encounter],
         silent: list[Bystander],
-        hand: Encounter | None,
+        hand: list[Encounter],
         hand_speed: float,
     ) -> None:
         self.position: Final = position
@@ -264,9 +267,8 @@ def _keep_off(
     """
     x, y, _ = trajectory.point
     u, v = avoidance.separation(x, y, around.drones, settings.separation)
-    if around.hand is not None:
-        a, b = avoidance.separation(x, y, [around.hand], settings.separation)
-        u, v = u + a, v + b
+    a, b = avoidance.separation(x, y, around.hand, settings.separation)
+    u, v = u + a, v + b
     pressing = _pressing(trajectory, around, settings.columns)
     if not pressing:
         return (u, v)
@@ -287,20 +289,24 @@ def _pressing(trajectory: Trajectory, around: Surroundings, columns: Columns | N
     """
     x, y, _ = around.position
     u, v, _ = around.velocity
-    body, flying = (x, y), (u, v)
-    found = [avoidance.threats(body, flying, around.drones, DRONE_BUBBLE)]
+    body, flying, pressing = (x, y), (u, v), NOTHING
+    pressing = _with(pressing, avoidance.threats(body, flying, around.drones, DRONE_BUBBLE))
     for silent in around.silent:
         wider = Bubble(silent.radius, DRONE_BUBBLE.lead, DRONE_BUBBLE.slip, DRONE_BUBBLE.response)
-        found.append(avoidance.threats(body, flying, [Encounter(silent.x, silent.y, 0.0, 0.0)], wider))
-    if around.hand is not None:
-        x, y, _ = trajectory.point
-        u, v, _ = trajectory.velocity
-        found.append(avoidance.threats((x, y), (u, v), [around.hand], HAND_BUBBLE))
-        found.append(avoidance.threats(body, flying, [around.hand], HAND_BUBBLE))
+        there = [Encounter(silent.x, silent.y, 0.0, 0.0)]
+        pressing = _with(pressing, avoidance.threats(body, flying, there, wider))
+    x, y, _ = trajectory.point
+    u, v, _ = trajectory.velocity
+    pressing = _with(pressing, avoidance.threats((x, y), (u, v), around.hand, HAND_BUBBLE))
+    pressing = _with(pressing, avoidance.threats(body, flying, around.hand, HAND_BUBBLE))
     if columns is not None:
         near = avoidance.columns_near(body, flying, columns.centres, COLUMN_BUBBLE)
-        found.append(avoidance.threats(body, flying, near, COLUMN_BUBBLE))
-    return [each for each in found if each]
+        pressing = _with(pressing, avoidance.threats(body, flying, near, COLUMN_BUBBLE))
+    return pressing
+
+
+def _with(pressing: list[list[Threat]], found: list[Threat]) -> list[list[Threat]]:
+    return [*pressing, found] if found else pressing
 
 
 def _lead_share(hand_speed: float, lead_above: float) -> float:

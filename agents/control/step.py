@@ -332,11 +332,11 @@ def _surroundings(inputs: Inputs) -> Surroundings:
     """Returns who is around; a silent hand stays where it was, but no longer comes closer."""
     position, flying, hand = inputs.position, inputs.velocity, inputs.hand
     if hand is None:
-        return Surroundings(position, flying, inputs.drones, inputs.silent, None, 0.0)
+        return Surroundings(position, flying, inputs.drones, inputs.silent, [], 0.0)
     velocity = hand.velocity if inputs.hand_age <= modes.HAND_STALE else ORIGIN
     x, y, _ = hand.position
     u, v, _ = velocity
-    return Surroundings(position, flying, inputs.drones, inputs.silent, Encounter(x, y, u, v), norm(velocity))
+    return Surroundings(position, flying, inputs.drones, inputs.silent, [Encounter(x, y, u, v)], norm(velocity))
 
 
 def _flags(

@@ -42,17 +42,18 @@ class Flock:
         held: AbstractSet[int] = frozenset(),
     ) -> None:
         flyers = start_flyers(scenario, formation, places, airborne=True, held=held)
-        self.members = [
-            Member(
+        flock: dict[int, Member] = {}
+        for row in (row for level in formation.levels for row in level):
+            drone = formation.ids[row]
+            flock[drone] = Member(
                 drone_row(scenario, formation, drone),
-                tuple(formation.row(other) for other in formation.references(drone)),
+                tuple(flock[other] for other in formation.references(drone)),
                 steering_settings(scenario, formation, drone),
-                flyer,
+                flyers[row],
             )
-            for drone, flyer in zip(formation.ids, flyers, strict=True)
-        ]
+        self.members = [flock[drone] for drone in formation.ids]
         self.tick = 0
-        self._order = [row for level in formation.levels for row in level]
+        self._flock = list(flock.values())
         self._rate = scenario.rates.control_hz
         self._stable = scenario.swarm.law == "stable"
 
@@ -65,7 +66,7 @@ class Flock:
         """
         dt = tick_length(self.tick - 1, self._rate) if self.tick else 1.0 / self._rate
         duration = tick_length(self.tick, self._rate)
-        advance_flock(self.members, self._order, sample, hand, dt, duration, stable=self._stable)
+        advance_flock(self._flock, sample, hand, dt, duration, stable=self._stable)
         self.tick += 1
 
 

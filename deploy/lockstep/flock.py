@@ -13,12 +13,14 @@ from agents.control.avoidance import DRONE_BUBBLE, Encounter
 from agents.control.goals import Guide, Row, goal_of
 from agents.control.hand import HandInput, MappedHand
 from agents.control.impedance import AT_REST, step_links
-from agents.control.steering import SteeringSettings, Surroundings, steer
+from agents.control.steering import Bystander, SteeringSettings, Surroundings, steer
 from agents.control.trajectory import start_at
-from agents.control.vectors import ORIGIN, norm, rotate
+from agents.control.vectors import ORIGIN, Vector, norm, rotate
 from agents.vehicles.bodies.fleet import Flyer, advance
 from agents.vehicles.bodies.state import FLY
 from shared.cells import Cells
+
+_NOBODY: Final[list[Bystander]] = []
 
 
 @final
@@ -27,7 +29,7 @@ class Member:
 
     Args:
         row: Its row of the formation.
-        references: Places of its references in the flock, in the order of the row's weights.
+        references: Its references, in the order of the row's weights.
         steering: Limits and fields.
         flyer: Its body at the start.
 
@@ -39,12 +41,16 @@ class Member:
         setpoint: m.
         links: Its impedance links.
         trajectory: Reference of the set-point.
+        guide: What those follow who refer to it.
+        encounter: What those see who keep off it.
     """
 
     __slots__ = (
+        "encounter",
         "flyer",
         "goal",
         "goal_velocity",
+        "guide",
         "links",
         "position",
         "references",
@@ -54,7 +60,9 @@ class Member:
         "trajectory",
     )
 
-    def __init__(self, row: Row, references: tuple[int, ...], steering: SteeringSettings, flyer: Flyer) -> None:
+    def __init__(
+        self, row: Row, references: "tuple[Member, ...]", steering: SteeringSettings, flyer: Flyer
+    ) -> None:
         self.row: Final = row
         self.references: Final = references
         self.steering: Final = steering
@@ -63,79 +71,71 @@ class Member:
         self.goal_velocity = ORIGIN
         self.links = (AT_REST,) * len(row.links)
         self.trajectory = start_at(self.position)
+        self.guide = Guide(self.goal, ORIGIN, modes.FOLLOW)
+        self.encounter = encounter_of(flyer.body.position, flyer.body.velocity)
+
+
+def encounter_of(position: Vector, velocity: Vector) -> Encounter:
+    """Returns what is at a position as others meet it, seen from above."""
+    x, y, _ = position
+    u, v, _ = velocity
+    return Encounter(x, y, u, v)
 
 
 def advance_flock(
-    members: list[Member],
-    order: list[int],
-    sample: HandInput,
-    hand: MappedHand,
-    dt: float,
-    duration: float,
-    *,
-    stable: bool,
+    flock: list[Member], sample: HandInput, hand: MappedHand, dt: float, duration: float, *, stable: bool
 ) -> None:
-    """Makes one tick: links, goals in reference order, set-points, bodies.
+    """Makes one tick: links, goals, set-points, bodies.
 
     Args:
-        members: The flock.
-        order: Their places, references before those who refer to them.
+        flock: Who flies, references before those who refer to them.
         sample: The hand.
         hand: The same mapped.
         dt: Time since the last tick, s.
         duration: Time to the next one, s.
         stable: Whether references are the others' goals instead of their positions.
     """
-    _set_goals(members, order, hand, dt, stable=stable)
-    x, y, _ = sample.position
-    u, v, _ = sample.velocity
-    own_hand, hand_speed = Encounter(x, y, u, v), norm(sample.velocity)
-    encounters = [_encounter(member) for member in members]
-    cells = Cells([*encounters], _reach(members, encounters))
-    for place, member in enumerate(members):
-        near = [encounters[other] for other in cells.near(place)]
-        body = member.flyer.body
-        around = Surroundings(body.position, body.velocity, near, [], own_hand, hand_speed)
+    _set_goals(flock, hand, dt, stable=stable)
+    own_hand, hand_speed = [encounter_of(sample.position, sample.velocity)], norm(sample.velocity)
+    cells = Cells([member.encounter for member in flock], _reach(flock))
+    for member in flock:
+        body, near = member.flyer.body, cells.near(member.encounter)
+        around = Surroundings(body.position, body.velocity, near, _NOBODY, own_hand, hand_speed)
         steered = steer(member.trajectory, member.goal, member.goal_velocity, around, member.steering, dt)
         member.trajectory, member.setpoint = steered.trajectory, steered.setpoint
-    for member in members:
+        # Nobody looks at the body itself any more in this tick.
         member.flyer = advance(member.flyer, FLY, member.setpoint, duration)
 
 
-def _set_goals(members: list[Member], order: list[int], hand: MappedHand, dt: float, *, stable: bool) -> None:
+def _set_goals(flock: list[Member], hand: MappedHand, dt: float, *, stable: bool) -> None:
     velocity = rotate(hand.velocity, -hand.yaw)
-    for place in order:
-        member = members[place]
+    for member in flock:
         member.position = member.flyer.body.position
+        member.encounter = encounter_of(member.position, member.flyer.body.velocity)
         member.links = step_links(member.links, member.row.links, velocity, dt)
-        lead = [_guide(members[other], stable=stable) for other in member.references]
-        member.goal, member.goal_velocity = goal_of(member.row, member.links, hand, lead)
+        lead = [reference.guide for reference in member.references]
+        goal, rate = goal_of(member.row, member.links, hand, lead)
+        member.goal, member.goal_velocity = goal, rate
+        member.guide = Guide(goal if stable else member.position, rate, modes.FOLLOW)
 
 
-def _guide(member: Member, *, stable: bool) -> Guide:
-    return Guide(member.goal if stable else member.position, member.goal_velocity, modes.FOLLOW)
-
-
-def _encounter(member: Member) -> Encounter:
-    x, y, _ = member.position
-    u, v, _ = member.flyer.body.velocity
-    return Encounter(x, y, u, v)
-
-
-def _reach(members: list[Member], encounters: list[Encounter]) -> float:
+def _reach(flock: list[Member]) -> float:
     """Returns how far anything can matter, m.
 
     The field acts on the reference, which is ahead of its body; the bubble grows with the closing speed, at
     most twice the largest difference from the mean velocity.
     """
-    mean_u = sum([each.u for each in encounters]) / float(len(encounters))
-    mean_v = sum([each.v for each in encounters]) / float(len(encounters))
-    ahead = apart = 0.0
-    for place, each in enumerate(encounters):
-        x, y, _ = members[place].trajectory.point
+    mean_u = mean_v = ahead = apart = 0.0
+    for member in flock:
+        mean_u += member.encounter.u
+        mean_v += member.encounter.v
+    mean_u, mean_v = mean_u / float(len(flock)), mean_v / float(len(flock))
+    for member in flock:
+        x, y, _ = member.trajectory.point
+        each = member.encounter
         ahead = max(ahead, (x - each.x) * (x - each.x) + (y - each.y) * (y - each.y))
         du, dv = each.u - mean_u, each.v - mean_v
         apart = max(apart, du * du + dv * dv)
-    field = members[0].steering.separation
+    field = flock[0].steering.separation
     bubble = DRONE_BUBBLE.radius + DRONE_BUBBLE.lead * 2.0 * math.sqrt(apart)
     return max(field.radius + field.d0 + math.sqrt(ahead), bubble)
