@@ -33,12 +33,12 @@ def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Sett
 def drone_row(scenario: Scenario, formation: Formation, drone: int) -> Row:
     """Returns the row of one drone; its weights are for `[human, formation.references(drone)...]`."""
     row, references = formation.row(drone), formation.references(drone)
-    columns = [0, *(1 + formation.row(other) for other in references)]
+    weights = formation.weights[row]
     own_heights = scenario.swarm.law == "stable" or scenario.formation.height_from == "references"
-    heights = [float(formation.rest[formation.row(other), 2]) for other in references]
+    heights = [formation.rest[formation.row(other)][2] for other in references]
     return Row(
-        weights=tuple(formation.weights[row][columns].tolist()),
-        offset=_vector(formation.offsets[row].tolist()),
+        weights=(weights.get(0, 0.0), *(weights[1 + formation.row(other)] for other in references)),
+        offset=formation.offsets[row],
         links=tuple(
             Link(link.name, _spring(link.mass, link.damping, link.stiffness, link.gain), link.limit)
             for link in formation.links_into(drone)
@@ -51,7 +51,7 @@ def drone_row(scenario: Scenario, formation: Formation, drone: int) -> Row:
 def hand_settings(scenario: Scenario, formation: Formation) -> HandSettings:
     """Returns how the hand is mapped, with the box that keeps the whole goal formation inside the fence."""
     low, high = hand_box(scenario, formation)
-    return mapping(scenario.hand, _vector(low.tolist()), _vector(high.tolist()), formation.radius)
+    return mapping(scenario.hand, low, high, formation.radius)
 
 
 def mapping(hand: Hand, low: Vector, high: Vector, radius: float) -> HandSettings:
@@ -84,8 +84,8 @@ def steering_settings(scenario: Scenario, formation: Formation, drone: int) -> S
         acceleration=scenario.limits.acceleration,
         separation=field_of(scenario.avoidance.separation),
         columns=_columns(scenario),
-        low=_vector(low.tolist()),
-        high=_vector(high.tolist()),
+        low=low,
+        high=high,
         tau=float(vehicle_settings(scenario, drone).tau),  # type: ignore[arg-type]  # resolved: never None
         always_lead=scenario.swarm.law == "stable",
         lead_above=scenario.hand.max_speed,
@@ -128,8 +128,3 @@ def _kin(scenario: Scenario, formation: Formation, drone: int) -> tuple[Kin, ...
         )
         for each in order
     )
-
-
-def _vector(numbers: list[float]) -> Vector:
-    x, y, z = numbers
-    return (x, y, z)

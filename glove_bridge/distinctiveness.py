@@ -15,7 +15,7 @@ from attrs import Factory, field, frozen
 
 from glove_bridge.patterns.pattern import Pattern
 from glove_bridge.patterns.schema import FINGERS, LONGEST_PATTERN_MS
-from shared.formation import Vec
+from shared.arrays import Vec
 
 FULL_HZ = 250.0
 """Frequency that counts as full drive."""

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from attrs import field, frozen
 
-from shared.formation import Formation, Vec
+from shared.arrays import Vec, rest_of
+from shared.formation import Formation
 from shared.geometry import hull_area
 
 _ON_CIRCLE = 1e-6
@@ -122,12 +123,12 @@ def default_geometry(formation: Formation, ids: Sequence[int]) -> Geometry:
         ids: Those that are heard, at least one.
     """
     rows = [formation.row(drone) for drone in ids]
-    rest = formation.rest[rows, :2]
+    rest = rest_of(formation)[rows, :2]
     pairs = neighbour_pairs(rest)
     return Geometry(
         ids=tuple(ids),
         rest=rest,
-        rooted=tuple(k for k, row in enumerate(rows) if formation.weights[row, 0] == 1.0),
+        rooted=tuple(k for k, row in enumerate(rows) if formation.weights[row].get(0) == 1.0),
         pairs=pairs,
         gaps=pair_distances(rest, pairs),
         area=area_of(rest),

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from glove_bridge.formation_state import Scene
-from shared.formation import Vec
+from shared.arrays import Vec
 from shared.messages import DroneState, Heard, Mode
 from shared.senses import Sensed, Senses
 from shared.topics import DRONE_STATE, HAND

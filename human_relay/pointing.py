@@ -6,15 +6,11 @@ time, and stays where it is while nobody holds it.
 
 import math
 
-import numpy as np
-import numpy.typing as npt
 from attrs import evolve, frozen
 
 from shared.clock import NS_PER_S
 from shared.messages import Vector, Wish
 from shared.pointer_link import SILENT_S, WISHES, Pointed, Verb
-
-Vec = npt.NDArray[np.float64]
 
 LONGEST_STEP = 0.1
 """A loop that was held up longer moves the hand no further than this long, s."""
@@ -115,20 +111,19 @@ def advance(state: PointerState, now_ns: int, limits: Limits) -> PointerState:
         return evolve(state, velocity=(0.0, 0.0, 0.0))
     if state.position is None:
         return evolve(state, position=state.target)
-    position, velocity = pursue(
-        np.array(state.position), np.array(state.velocity), np.array(state.target), dt, limits
-    )
-    (x, y, z), (vx, vy, vz) = position.tolist(), velocity.tolist()
-    return evolve(state, position=(x, y, z), velocity=(vx, vy, vz))
+    position, velocity = pursue(state.position, state.velocity, state.target, dt, limits)
+    return evolve(state, position=position, velocity=velocity)
 
 
-def pursue(position: Vec, velocity: Vec, target: Vec, dt: float, limits: Limits) -> tuple[Vec, Vec]:
+def pursue(
+    position: Vector, velocity: Vector, target: Vector, dt: float, limits: Limits
+) -> tuple[Vector, Vector]:
     """Moves a point towards a target that it can still stop at.
 
     Args:
-        position: (3,) m.
-        velocity: (3,) m/s.
-        target: (3,) m.
+        position: m.
+        velocity: m/s.
+        target: m.
         dt: s, >= 0.
         limits: Bounds.
 
@@ -137,13 +132,14 @@ def pursue(position: Vec, velocity: Vec, target: Vec, dt: float, limits: Limits)
     """
     if dt <= 0.0:
         return position, velocity
-    way = target - position
-    distance = float(np.linalg.norm(way))
+    (x, y, z), (u, v, w), (a, b, c) = position, velocity, target
+    distance = math.dist(position, target)
     stoppable = math.sqrt(2.0 * _BRAKING * limits.acceleration * distance)
-    speed = min(limits.speed, stoppable, distance / dt)
-    wanted = way * (speed / distance) if distance > 0.0 else np.zeros(3)
-    change = wanted - velocity
-    most = limits.acceleration * dt
-    size = float(np.linalg.norm(change))
-    velocity = wanted if size <= most else velocity + change * (most / size)
-    return position + velocity * dt, velocity
+    share = min(limits.speed, stoppable, distance / dt) / distance if distance > 0.0 else 0.0
+    wanted = ((a - x) * share, (b - y) * share, (c - z) * share)
+    most, size = limits.acceleration * dt, math.dist(wanted, velocity)
+    p, q, r = wanted
+    if size > most:
+        part = most / size
+        p, q, r = u + (p - u) * part, v + (q - v) * part, w + (r - w) * part
+    return (x + p * dt, y + q * dt, z + r * dt), (p, q, r)

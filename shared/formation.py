@@ -1,23 +1,25 @@
-"""The formation as matrices: reference weights, offsets, links, order and rest shape (DESIGN section 4).
+"""The formation row by row: reference weights, offsets, links, order and rest shape (DESIGN section 4).
 
 A formation is a matrix with rows >= 0 and sum 1 over `[human, drone 1, ..., drone N]`; one agent is one row.
-The reference graph must be a DAG rooted at the human.
+The reference graph must be a DAG rooted at the human. Plain numbers, for agents know no others; as arrays for
+reports and figures see `shared.arrays`.
 """
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
-import numpy as np
-import numpy.typing as npt
-from attrs import field, frozen
+from attrs import frozen
 
 from shared.cells import near_pairs
 from shared.errors import ConfigError
+from shared.messages import ORIGIN, Vector
 from shared.scenario import Drone, Impedance, Scenario
 from shared.shapes import HUMAN, generate
 
-Vec = npt.NDArray[np.float64]
+Weights = Mapping[int, float]
+"""One row: column in `[human, drones...]` -> weight; those that are not in it are 0."""
 
 PAPER_MAX_DEPTH = 4
 """The `paper` law is string-unstable: each hop adds lag and gain (PAPER.md)."""
@@ -54,21 +56,21 @@ class Formation:
 
     Attributes:
         ids: Numbers of the drones, ascending, length N.
-        weights: (N, N + 1) reference weights over `[human, drones...]`, rows sum to 1.
-        offsets: (N, 3) place relative to the weighted references, formation frame, m.
+        weights: Row by row the reference weights over `[human, drones...]`, by column; they sum to 1.
+        offsets: Places relative to the weighted references, formation frame, m.
         links: Every impedance link.
         levels: Rows of the drones by depth: all references of a level are in earlier ones.
         depth: Number of levels.
-        rest: (N, 3) rest shape relative to the mapped hand, formation frame, m.
+        rest: Rest shape relative to the mapped hand, formation frame, m.
         correction_scale: Factor on every correction (1 for the paper's law).
     """
 
     ids: tuple[int, ...]
-    weights: Vec = field(eq=False)
-    offsets: Vec = field(eq=False)
+    weights: tuple[Weights, ...]
+    offsets: tuple[Vector, ...]
     links: tuple[Link, ...]
     levels: tuple[tuple[int, ...], ...]
-    rest: Vec = field(eq=False)
+    rest: tuple[Vector, ...]
     correction_scale: float
 
     @property
@@ -78,16 +80,16 @@ class Formation:
 
     def row(self, drone: int) -> int:
         """Returns the row of a drone by its number."""
-        return self.ids.index(drone)
+        return self._rows[drone]
 
     def references(self, drone: int) -> tuple[int, ...]:
         """Returns the numbers of the drones that one refers to directly (the human is not among them)."""
-        row = self.weights[self.row(drone), 1:]
-        return tuple(self.ids[column] for column in np.flatnonzero(row))
+        weights = self.weights[self.row(drone)]
+        return tuple(self.ids[column - 1] for column, weight in weights.items() if column and weight)
 
     def refers_to_human(self, drone: int) -> bool:
         """Says whether a drone refers to the human directly."""
-        return bool(self.weights[self.row(drone), 0] > 0)
+        return self.weights[self.row(drone)].get(0, 0.0) > 0.0
 
     def ancestors(self, drone: int) -> tuple[int, ...]:
         """Returns the numbers of all drones that one depends on, however indirectly."""
@@ -102,13 +104,23 @@ class Formation:
 
     def links_into(self, drone: int) -> tuple[Link, ...]:
         """Returns the impedance links into one drone."""
-        row = self.row(drone)
-        return tuple(link for link in self.links if link.target == row)
+        return self._links.get(self.row(drone), ())
 
     @property
     def radius(self) -> float:
         """Horizontal distance of the outermost drone from the mapped hand at rest, m."""
-        return float(np.linalg.norm(self.rest[:, :2], axis=1).max())
+        return max(math.hypot(x, y) for x, y, _ in self.rest)
+
+    @cached_property
+    def _rows(self) -> dict[int, int]:
+        return {drone: row for row, drone in enumerate(self.ids)}
+
+    @cached_property
+    def _links(self) -> dict[int, tuple[Link, ...]]:
+        found: defaultdict[int, tuple[Link, ...]] = defaultdict(tuple)
+        for link in self.links:
+            found[link.target] += (link,)
+        return dict(found)
 
 
 def build_formation(scenario: Scenario, origin: str = "scenario") -> Formation:
@@ -130,8 +142,8 @@ def build_formation(scenario: Scenario, origin: str = "scenario") -> Formation:
     _check_ids(drones, scenario, where)
     ids = tuple(drone.id for drone in drones)
     columns = {HUMAN: 0} | {str(number): column for column, number in enumerate(ids, start=1)}
-    weights = np.array([_weight_row(drone, columns, where) for drone in drones])
-    offsets = np.array([drone.offset for drone in drones], dtype=np.float64)
+    weights = tuple(_weight_row(drone, columns, where) for drone in drones)
+    offsets = tuple(_floats(drone.offset) for drone in drones)
     levels = _levels(weights, ids, where)
     if scenario.swarm.law == "paper" and len(levels) > PAPER_MAX_DEPTH:
         raise ConfigError(
@@ -164,17 +176,22 @@ def _check_ids(drones: Sequence[Drone], scenario: Scenario, where: str) -> None:
             raise ConfigError(f"{where}: vehicles.robots.{robot} names no drone of the formation {ids}")
 
 
-def _weight_row(drone: Drone, columns: Mapping[str, int], where: str) -> Vec:
+def _floats(numbers: Vector) -> Vector:
+    x, y, z = map(float, numbers)
+    return (x, y, z)
+
+
+def _weight_row(drone: Drone, columns: Mapping[str, int], where: str) -> Weights:
     where = f"{where}.drones, drone {drone.id}"
     if not drone.references:
         raise ConfigError(f'{where}: no references; refer to "human" or to another drone')
     weights = drone.weights or (1.0 / len(drone.references),) * len(drone.references)
     if len(weights) != len(drone.references) or min(weights) < 0 or abs(sum(weights) - 1.0) > 1e-9:
         raise ConfigError(f"{where}: weights {weights} must be >= 0, one per reference, with sum 1")
-    row = np.zeros(len(columns))
+    row: defaultdict[int, float] = defaultdict(float)
     for reference, weight in zip(drone.references, weights, strict=True):
         row[_column(reference, columns, where)] += weight
-    return row
+    return dict(sorted(row.items()))
 
 
 def _column(reference: str, columns: Mapping[str, int], where: str) -> int:
@@ -185,36 +202,52 @@ def _column(reference: str, columns: Mapping[str, int], where: str) -> int:
     return columns[reference]
 
 
-def _levels(weights: Vec, ids: tuple[int, ...], where: str) -> tuple[tuple[int, ...], ...]:
+def _parents(weights: Weights) -> list[int]:
+    """Returns the rows of the drones that one refers to."""
+    return [column - 1 for column, weight in weights.items() if column and weight]
+
+
+def _levels(weights: tuple[Weights, ...], ids: tuple[int, ...], where: str) -> tuple[tuple[int, ...], ...]:
     """Sorts the rows by depth (Kahn); whatever never becomes ready is in, or behind, a cycle."""
     levels: list[tuple[int, ...]] = []
-    placed: set[int] = set()
-    references = [frozenset(np.flatnonzero(row[1:]).tolist()) for row in weights]
-    waiting = set(range(len(ids)))
-    while waiting:
-        ready = tuple(sorted(row for row in waiting if references[row] <= placed))
-        if not ready:
-            stuck = sorted(ids[row] for row in waiting)
-            raise ConfigError(
-                f"{where}.drones: drones {stuck} form a cycle or have no path to the human except through one."
-                " Let one of them refer only to the human or to drones outside the cycle"
-            )
-        levels.append(ready)
-        placed |= set(ready)
-        waiting -= set(ready)
+    missing = [len(_parents(row)) for row in weights]
+    children = defaultdict(list)
+    for row, own in enumerate(weights):
+        for parent in _parents(own):
+            children[parent].append(row)
+    ready = [row for row, count in enumerate(missing) if not count]
+    while ready:
+        levels.append(tuple(sorted(ready)))
+        behind = [child for row in ready for child in children[row]]
+        ready = []
+        for child in behind:
+            missing[child] -= 1
+            if not missing[child]:
+                ready.append(child)
+    if stuck := [ids[row] for row, count in enumerate(missing) if count]:
+        raise ConfigError(
+            f"{where}.drones: drones {stuck} form a cycle or have no path to the human except through one."
+            " Let one of them refer only to the human or to drones outside the cycle"
+        )
     return tuple(levels)
 
 
-def _rest_shape(weights: Vec, offsets: Vec, levels: tuple[tuple[int, ...], ...]) -> Vec:
-    positions = np.zeros((len(offsets) + 1, 3))
-    for level in levels:
-        for row in level:
-            positions[row + 1] = weights[row] @ positions + offsets[row]
-    return positions[1:]
+def _rest_shape(
+    weights: tuple[Weights, ...], offsets: tuple[Vector, ...], levels: tuple[tuple[int, ...], ...]
+) -> tuple[Vector, ...]:
+    places: dict[int, Vector] = {0: ORIGIN}
+    for row in (row for level in levels for row in level):
+        x = y = z = 0.0
+        for column, weight in weights[row].items():
+            a, b, c = places[column]
+            x, y, z = x + weight * a, y + weight * b, z + weight * c
+        a, b, c = offsets[row]
+        places[row + 1] = (x + a, y + b, z + c)
+    return tuple(places[row + 1] for row in range(len(offsets)))
 
 
-def _check_distances(rest: Vec, ids: tuple[int, ...], smallest: float, where: str) -> None:
-    points = [(x, y) for x, y, _ in rest.tolist()]
+def _check_distances(rest: tuple[Vector, ...], ids: tuple[int, ...], smallest: float, where: str) -> None:
+    points = [(x, y) for x, y, _ in rest]
     gaps = {(i, j): math.dist(points[i], points[j]) for i, j in near_pairs(points, smallest)}
     nearest = min(gaps, key=gaps.__getitem__, default=None)
     if nearest is not None and gaps[nearest] < smallest:
@@ -267,18 +300,18 @@ def _build_link(name: str, default: Impedance, special: object, columns: Mapping
 
 
 def _correction_scale(
-    scenario: Scenario, links: tuple[Link, ...], weights: Vec, levels: tuple[tuple[int, ...], ...]
+    scenario: Scenario,
+    links: tuple[Link, ...],
+    weights: tuple[Weights, ...],
+    levels: tuple[tuple[int, ...], ...],
 ) -> float:
     """Bounds the sum of corrections along the deepest path by `total_limit` (`stable` law only)."""
     if scenario.swarm.law == "paper":
         return 1.0
-    own = np.zeros(len(weights))
+    total = [0.0] * len(weights)
     for link in links:
-        own[link.target] += link.limit if link.gain else 0.0
-    total = np.zeros(len(weights))
-    for level in levels:
-        for row in level:
-            parents = np.flatnonzero(weights[row, 1:])
-            total[row] = own[row] + max((total[parent] for parent in parents), default=0.0)
-    worst = float(total.max())
+        total[link.target] += link.limit if link.gain else 0.0
+    for row in (row for level in levels for row in level):
+        total[row] += max((total[parent] for parent in _parents(weights[row])), default=0.0)
+    worst = max(total)
     return min(1.0, scenario.swarm.total_limit / worst) if worst > 0 else 1.0

@@ -3,7 +3,7 @@
 Order matters: of two nodes that need each other the later one in `all_nodes` dials, so no pair links twice.
 """
 
-import numpy as np
+import math
 
 from shared.formation import Formation
 from shared.scenario import Net, Scenario
@@ -66,8 +66,9 @@ def neighbours(scenario: Scenario, formation: Formation, drone: int) -> tuple[in
     """Returns the drones that one hears: all of a small swarm, else its ancestors and those near it."""
     if len(formation.ids) <= scenario.net.full_mesh:
         return tuple(other for other in formation.ids if other != drone)
-    gaps = np.linalg.norm(formation.rest - formation.rest[formation.row(drone)], axis=1)
-    near = {other for other, gap in zip(formation.ids, gaps, strict=True) if gap <= NEAR}
+    own = formation.rest[formation.row(drone)]
+    pairs = zip(formation.ids, formation.rest, strict=True)
+    near = {other for other, place in pairs if math.dist(own, place) <= NEAR}
     return tuple(sorted((near | set(formation.ancestors(drone))) - {drone}))
 
 

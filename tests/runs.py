@@ -64,7 +64,7 @@ def fly_all(
 
 def distances(scenario: Scenario, ticks: Iterator[Tick]) -> Distances:
     """Watches runs to their end."""
-    low, high = fence_box(scenario, build_formation(scenario))
+    low, high = map(np.array, fence_box(scenario, build_formation(scenario)))
     worst: Distances | None = None
     for tick in ticks:
         now = _distances_now(tick, low, high)

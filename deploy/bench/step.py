@@ -97,7 +97,7 @@ def flight_of(scenario: Scenario, formation: Formation, drone: int, ticks: int) 
 
 
 def _places(formation: Formation) -> list[Vector]:
-    return [(x, y, z + HEIGHT) for x, y, z in formation.rest.tolist()]
+    return [(x, y, z + HEIGHT) for x, y, z in formation.rest]
 
 
 def _pose(state: DroneState, tick: int) -> Pose:

@@ -10,6 +10,7 @@ from agents.settings import hand_settings
 from deploy.falsify.case import Case, Fault, FaultKind, Stroke, Weather, Wished
 from deploy.falsify.hand import duration_of
 from deploy.falsify.swarm import prepare
+from shared.arrays import rest_of
 from shared.errors import ConfigError
 from shared.formation import Formation
 from shared.messages import Vector
@@ -197,7 +198,7 @@ def _overrides(scenario: str, plan: Plan, rng: Rng) -> tuple[str, ...]:
 def _draw_columns(scenario: Scenario, formation: Formation, rng: Rng) -> str:
     """Draws columns about the formation, none of them where a drone begins."""
     home = np.array(scenario.hand.home)
-    rest = home + formation.rest[:, :2]
+    rest = home + rest_of(formation)[:, :2]
     columns = []
     for number in range(int(rng.integers(1, 5))):
         place = home + rng.uniform(-1.0, 1.0, 2) * (formation.radius + 1.5)

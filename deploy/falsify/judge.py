@@ -12,7 +12,7 @@ from attrs import frozen
 from agents.vehicles.bodies.state import AIRBORNE_HEIGHT
 from agents.vehicles.world.referee import Rules
 from deploy.falsify.swarm import Flown, Mask
-from shared.formation import Vec
+from shared.arrays import Vec
 
 Kind = Literal["drones", "hand", "column", "fence_x", "fence_y", "fence_z", "floor"]
 

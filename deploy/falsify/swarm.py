@@ -18,9 +18,10 @@ from deploy.falsify.case import Case, FaultKind
 from deploy.falsify.hand import poses, samples
 from deploy.lockstep.start import rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
+from shared.arrays import Vec
 from shared.clock import NS_PER_S
 from shared.config import vehicle_settings
-from shared.formation import Formation, Vec
+from shared.formation import Formation
 from shared.messages import DroneState, HandSample, Mode, Vector
 from shared.nodes import neighbours
 from shared.scenario import Scenario
@@ -88,7 +89,7 @@ def _start(case: Case, scenario: Scenario, formation: Formation, first: HandSamp
     if case.airborne:
         return rest_places(formation, map_hand(None, hand_input(first), hand_settings(scenario, formation)))
     home_x, home_y = scenario.hand.home
-    return [(home_x + x, home_y + y, 0.0) for x, y, _ in formation.rest.tolist()]
+    return [(home_x + x, home_y + y, 0.0) for x, y, _ in formation.rest]
 
 
 Row = tuple[list[Vector], list[bool], list[bool], list[bool]]

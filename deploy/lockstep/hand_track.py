@@ -12,8 +12,8 @@ from agents.control.hand import HandInput, HandSettings, MappedHand, map_hand
 from deploy.lockstep.ticks import tick_ns
 from human_relay.relay import RelayState, make_sample
 from human_relay.sources import open_source
+from shared.arrays import Vec
 from shared.clock import NS_PER_S
-from shared.formation import Vec
 from shared.messages import HandSample
 
 

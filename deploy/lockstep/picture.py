@@ -69,7 +69,7 @@ def _draw_paths(axes: "Axes", record: Record) -> None:
 def _draw_formation(axes: "Axes", record: Record, tick: int, strength: float) -> None:
     places = np.vstack([record.hand.point[tick], record.position[tick]])
     for row, weights in enumerate(record.formation.weights):
-        for reference in np.flatnonzero(weights).tolist():
+        for reference in (column for column, weight in weights.items() if weight):
             ends = places[[reference, row + 1]]
             axes.plot(ends[:, 1], ends[:, 0], color="0.35", lw=1.0, alpha=strength, zorder=3)
     axes.scatter(places[0, 1], places[0, 0], marker="*", s=90, color=HAND, alpha=strength, zorder=4)

@@ -11,7 +11,8 @@ from attrs import field, frozen
 from agents.vehicles.bodies.state import AIRBORNE_HEIGHT
 from agents.vehicles.world.referee import RefereeState, Rules, report, update
 from deploy.lockstep.hand_track import HandTrack
-from shared.formation import Formation, Vec
+from shared.arrays import Vec
+from shared.formation import Formation
 
 
 class Moment(NamedTuple):

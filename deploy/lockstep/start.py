@@ -14,7 +14,7 @@ from shared.scenario import Scenario
 
 def rest_places(formation: Formation, hand: MappedHand) -> list[Vector]:
     """Returns the places of the rest formation about a mapped hand, m."""
-    (hx, hy, hz), turned = hand.point, [rotate((x, y, z), hand.yaw) for x, y, z in formation.rest.tolist()]
+    (hx, hy, hz), turned = hand.point, [rotate((x, y, z), hand.yaw) for x, y, z in formation.rest]
     return [(hx + x, hy + y, hz + z) for x, y, z in turned]
 
 

@@ -24,7 +24,7 @@ from glove_bridge.formation_state import (
     right_of,
 )
 from glove_bridge.rules.thresholds import Thresholds
-from shared.formation import Vec
+from shared.arrays import Vec
 
 
 def read(geometry: Geometry, scene: Scene, memory: Memory, limits: Thresholds) -> tuple[Reading, Memory]:

@@ -6,8 +6,9 @@ Pure.
 import numpy as np
 
 from observer.console.protocol import PROTOCOL_VERSION, Json
+from shared.arrays import Vec
 from shared.fence import fence_box, goal_box, hand_box
-from shared.formation import Formation, Vec
+from shared.formation import Formation
 from shared.messages import Vector
 from shared.scenario import Scenario
 from shared.shapes import HUMAN
@@ -26,10 +27,11 @@ class HandMap:
 
     def __init__(self, scenario: Scenario, formation: Formation) -> None:
         hand = scenario.hand
-        self.low, self.high = hand_box(scenario, formation)
+        (a, b, lowest), (c, d, highest) = hand_box(scenario, formation)
         floor, ceiling = (corner[2] for corner in goal_box(scenario, formation))
-        self.high[2] = min(self.high[2], ceiling)
-        self.low[2] = min(max(self.low[2], floor + CLEARANCE), self.high[2])
+        top = min(highest, ceiling)
+        self.low: Vector = (a, b, min(max(lowest, floor + CLEARANCE), top))
+        self.high: Vector = (c, d, top)
         self._fixed_height = hand.height
         self._offset, self._gain = np.zeros(3), 1.0
         if hand.mapping == "relative":
@@ -62,14 +64,14 @@ def scene(scenario: Scenario, formation: Formation, hand: HandMap) -> Json:
         "can_steer": bool(scenario.net.pointer),
         "hand": {
             "start": hand.start,
-            "low": _vector(hand.low),
-            "high": _vector(hand.high),
+            "low": hand.low,
+            "high": hand.high,
             "max_speed": scenario.hand.max_speed,
             "fixed_height": scenario.hand.height is not None,
             "follow_yaw": scenario.hand.follow_yaw,
         },
         "takeoff_height": scenario.limits.takeoff_height,
-        "fence": {"min": _vector(low), "max": _vector(high)},
+        "fence": {"min": low, "max": high},
         "obstacles": [
             {"name": o.name, "x": o.x, "y": o.y, "radius": columns.radius, "range": columns.radius + columns.d0}
             for o in scenario.obstacles
@@ -92,7 +94,7 @@ def _drone(formation: Formation, drone: int) -> Json:
     return {
         "id": drone,
         "references": [*human, *formation.references(drone)],
-        "rest": _vector(formation.rest[formation.row(drone)]),
+        "rest": formation.rest[formation.row(drone)],
     }
 
 

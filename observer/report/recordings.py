@@ -13,6 +13,7 @@ from attrs import frozen
 from scipy.signal import savgol_filter
 
 from observer.report.record import ROW_HZ, FlightRecord, Played, hold, mapped_hand, resample
+from shared.arrays import rest_of
 from shared.clock import NS_PER_S
 from shared.errors import ConfigError
 from shared.formation import build_formation
@@ -156,7 +157,7 @@ def _record(flight: _Recording) -> FlightRecord:
     else:
         mapped = mapped_hand(hand, flight.mapping)
         mapped[:, 2] = setpoint[:, 0, 2]
-        goal = mapped[:, None] + formation.rest
+        goal = mapped[:, None] + rest_of(formation)
     return FlightRecord(
         name=flight.name,
         source=flight.source,

@@ -66,7 +66,7 @@ def read_trace(trace: Trace, name: str) -> FlightRecord:
         goal=bodies("goal"),
         setpoint=bodies("setpoint"),
         displacement=_displacements(formation, heard.states, t, start_ns),
-        default_area=hull_area((x, y) for x, y, _ in formation.rest.tolist()),
+        default_area=hull_area((x, y) for x, y, _ in formation.rest),
         obstacles=scenario.obstacles,
         safety_radius=_safety_radius(scenario.avoidance),
         patterns=_played(heard.events, start_ns),

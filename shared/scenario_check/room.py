@@ -1,13 +1,12 @@
 """Whether everything is where it fits: fence, formation, home, heights, hand and columns."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 
-import numpy as np
-
 from shared.fence import fence_box, goal_box, hand_box, shape_box
-from shared.formation import Formation, Vec
-from shared.scenario import Scenario
+from shared.formation import Formation
+from shared.scenario import Pair, Scenario
 from shared.scenario_check.finding import Finding
 
 LOWEST_TAKEOFF = 0.2
@@ -47,12 +46,11 @@ def _formation_fits(scenario: Scenario, formation: Formation) -> Iterator[Findin
 
 def _home_fits(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
     low, high = fence_box(scenario, formation)
-    home = np.array(scenario.hand.home)
-    for drone, place in zip(formation.ids, home + formation.rest[:, :2], strict=True):
-        if (place < low[:2]).any() or (place > high[:2]).any():
+    for drone, (x, y) in zip(formation.ids, _starts(scenario, formation), strict=True):
+        if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
             yield Finding(
                 "hand.home",
-                f"drone {drone} begins at ({place[0]:.2f}, {place[1]:.2f}), outside the fence from"
+                f"drone {drone} begins at ({x:.2f}, {y:.2f}), outside the fence from"
                 f" ({low[0]:.2f}, {low[1]:.2f}) to ({high[0]:.2f}, {high[1]:.2f})",
                 "move hand.home or the fence",
             )
@@ -81,7 +79,8 @@ def _heights_fit(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
             f"{takeoff:g} m is above what the fence allows, {highest:.2f} m: a drone would climb for ever",
             "lower it, or raise fence.max",
         )
-    lowest, tallest = formation.rest[:, 2].min(), formation.rest[:, 2].max()
+    heights = [z for _, _, z in formation.rest]
+    lowest, tallest = min(heights), max(heights)
     if hand is not None and not (hand + lowest > max(floor, 0.0) and hand + tallest <= highest):
         yield Finding(
             "hand.height",
@@ -96,12 +95,12 @@ def _clip_fits(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
         return
     (low, high), (base_low, base_high) = fence_box(scenario, formation), hand_box(scenario, formation)
     lower, upper = shape_box(scenario, formation)
-    reach_low, reach_high = (base_low + lower)[:2], (base_high + upper)[:2]
     for axis in range(2):
-        if reach_low[axis] < low[axis] - _ROUNDING or reach_high[axis] > high[axis] + _ROUNDING:
+        reach_low, reach_high = base_low[axis] + lower[axis], base_high[axis] + upper[axis]
+        if reach_low < low[axis] - _ROUNDING or reach_high > high[axis] + _ROUNDING:
             yield Finding(
                 "hand.clip",
-                f"it lets the formation reach from {reach_low[axis]:.2f} to {reach_high[axis]:.2f} m along"
+                f"it lets the formation reach from {reach_low:.2f} to {reach_high:.2f} m along"
                 f" {_AXES[axis]}, the fence from {low[axis]:.2f} to {high[axis]:.2f} m",
                 "narrow the clip, or widen the fence",
             )
@@ -111,15 +110,22 @@ def _columns_fit(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
     for name, times in Counter(column.name for column in scenario.obstacles).items():
         if times > 1:
             yield Finding("obstacles", f"the name {name!r} appears {times} times", "give each its own")
-    places: Vec = np.array(scenario.hand.home) + formation.rest[:, :2]
+    starts = _starts(scenario, formation)
     needed = scenario.avoidance.columns.radius + BODY + START_ROOM
     for column in scenario.obstacles:
-        gaps = np.hypot(*(places - (column.x, column.y)).T)
-        nearest = int(np.argmin(gaps))
-        if gaps[nearest] < needed:
+        gaps = [math.dist(start, (column.x, column.y)) for start in starts]
+        nearest = min(gaps)
+        if nearest < needed:
             yield Finding(
                 "obstacles",
-                f"column {column.name!r} stands {gaps[nearest]:.2f} m from where drone {formation.ids[nearest]}"
+                f"column {column.name!r} stands {nearest:.2f} m from where drone"
+                f" {formation.ids[gaps.index(nearest)]}"
                 f" begins, less than {needed:.2f} m",
                 "move the column, or hand.home",
             )
+
+
+def _starts(scenario: Scenario, formation: Formation) -> list[Pair]:
+    """Returns where the drones begin, m."""
+    home_x, home_y = scenario.hand.home
+    return [(home_x + x, home_y + y) for x, y, _ in formation.rest]

@@ -37,7 +37,7 @@ def speak(file: str) -> None:
             centre = _on_circle(RATE_RAD_S * (now - start) / 1e9)
             hand(encode(_hand(centre, start, seq, now)))
             for i, publish in drones.items():
-                x, y, z = formation.rest[formation.row(i)].tolist()
+                x, y, z = formation.rest[formation.row(i)]
                 place = (x + centre[0], y + centre[1], z + centre[2])
                 publish(encode(_state(i, place, start, seq, now)))
             seq += 1

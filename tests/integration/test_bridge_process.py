@@ -79,7 +79,7 @@ def test_without_a_swarm_it_says_so_and_waits(bridge: "subprocess.Popen[str]", s
 
 
 def state(drone: int, seq: int) -> bytes:
-    x, y, z = FORMATION.rest[FORMATION.row(drone)].tolist()
+    x, y, z = FORMATION.rest[FORMATION.row(drone)]
     moment = DroneState(
         epoch=1,
         seq=seq,

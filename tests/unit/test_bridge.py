@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from glove_bridge.bridge import Bridge, Step
 from glove_bridge.gloves.base import Outcome, Report
 from glove_bridge.patterns import CUES, load_patterns
+from shared.arrays import rest_of
 from shared.codec import MAX_PAYLOAD, encode
 from shared.config import load_scenario
 from shared.errors import ConfigError
@@ -31,7 +32,7 @@ def make(patterns: str = "flight", scenario: Any = RHOMBUS) -> Bridge:
 
 
 def state(drone: int, position: Vector, seq: int, mode: Mode = Mode.FOLLOW) -> DroneState:
-    goal = (*FORMATION.rest[FORMATION.row(drone)].tolist(),)
+    goal = FORMATION.rest[FORMATION.row(drone)]
     return DroneState(
         epoch=7,
         seq=seq,
@@ -60,9 +61,10 @@ def hear(
     seq = now_ns // MS
     hand = HandSample(epoch=3, seq=seq, stamp_ns=0, position=ORIGIN, velocity=ORIGIN, yaw=0.0, mode=wish)
     arrivals = {HAND.key(): [Arrival(encode(hand), now_ns)]}
-    centre = FORMATION.rest.mean(axis=0)
+    rest = rest_of(FORMATION)
+    centre = rest.mean(axis=0)
     for drone in drones:
-        place = centre + scale * (FORMATION.rest[FORMATION.row(drone)] - centre)
+        place = centre + scale * (rest[FORMATION.row(drone)] - centre)
         x, y, z = place.tolist()
         message = state(drone, (x, y + shift, z), seq, mode)
         arrivals[DRONE_STATE.key(id=drone)] = [Arrival(encode(message), now_ns)]
@@ -187,12 +189,12 @@ def test_states_of_different_age_do_not_deform_a_moving_formation() -> None:
     late = START + 200 * MS
     for drone in (1, 2):
         moving = replace(state(drone, ORIGIN, 1), velocity=(1.0, 0.0, 0.0), epoch=8)
-        x, y, z = FORMATION.rest[FORMATION.row(drone)].tolist()
+        x, y, z = FORMATION.rest[FORMATION.row(drone)]
         bridge.receive(
             {DRONE_STATE.key(id=drone): [Arrival(encode(replace(moving, position=(x, y, z))), START)]}
         )
     for drone in (3, 4):
-        x, y, z = FORMATION.rest[FORMATION.row(drone)].tolist()
+        x, y, z = FORMATION.rest[FORMATION.row(drone)]
         moved = replace(state(drone, (x + 0.2, y, z), 1), velocity=(1.0, 0.0, 0.0), epoch=8)
         bridge.receive({DRONE_STATE.key(id=drone): [Arrival(encode(moved), late)]})
     found = bridge.step(late).state
@@ -224,7 +226,7 @@ def test_every_set_flies_and_cues_alone_are_refused() -> None:
 def test_the_state_of_a_large_swarm_fits_into_a_payload(count: int, named: int) -> None:
     scenario = load_scenario("grid", [f"formation.n={count}"])
     bridge = make("paper", scenario)
-    for row, (x, y, z) in enumerate(build_formation(scenario).rest.tolist()):
+    for row, (x, y, z) in enumerate(build_formation(scenario).rest):
         message = replace(state(1, (x, y, z), 2**40), id=row + 1, epoch=2**62)
         bridge.receive({DRONE_STATE.key(id=row + 1): [Arrival(encode(message), 2**62)]})
     found = bridge.step(2**62).state

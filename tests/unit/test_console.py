@@ -291,13 +291,11 @@ def test_a_page_that_stops_reading_is_let_go() -> None:
 def test_a_mapped_hand_comes_back_from_the_real_one(name: str) -> None:
     scenario = load_scenario(name)
     hand = HandMap(scenario, build_formation(scenario))
-    for point in (hand.start, tuple(hand.low.tolist()), tuple(hand.high.tolist())):
-        x, y, z = point
-        there = hand.mapped((x, y, z))
+    for point in (hand.start, hand.low, hand.high):
+        there = hand.mapped(point)
         assert hand.mapped(hand.real(there)) == pytest.approx(there)
     far = hand.mapped(hand.real((99.0, -99.0, -99.0)))
-    assert all(hand.low - 1e-9 <= far)
-    assert all(far <= hand.high + 1e-9)
+    assert all(low - 1e-9 <= x <= high + 1e-9 for low, x, high in zip(hand.low, far, hand.high, strict=True))
     if scenario.hand.height is None:
         assert far[2] >= CLEARANCE - 0.1
 

@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.settings import agent_settings, hand_settings
+from shared.arrays import Vec, rest_of
 from shared.config import SCENARIOS, load_scenario, structure_scenario
 from shared.fence import fence_box
-from shared.formation import Vec, build_formation
+from shared.formation import build_formation
 from shared.scenario import Scenario
 
 SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
@@ -23,7 +24,7 @@ def heading(yaw: float) -> Vec:
 def places(scenario: Scenario) -> Vec:
     """(2 N, 3) every drone on the ground below its place at home, and at the take-off height."""
     formation = build_formation(scenario)
-    home = formation.rest + np.array([*scenario.hand.home, 0.0])
+    home = rest_of(formation) + np.array([*scenario.hand.home, 0.0])
     up = home + np.array([0.0, 0.0, scenario.limits.takeoff_height])
     return np.vstack([home * (1.0, 1.0, 0.0), up])
 
@@ -31,7 +32,7 @@ def places(scenario: Scenario) -> Vec:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_fence_of_a_scenario_that_ships_contains_it(name: str) -> None:
     scenario = load_scenario(name)
-    low, high = fence_box(scenario, build_formation(scenario))
+    low, high = map(np.array, fence_box(scenario, build_formation(scenario)))
     margin = np.array([scenario.fence.margin, scenario.fence.margin, 0.0])
     assert (places(scenario) >= low + margin).all()
     assert (places(scenario) <= high - margin).all()
@@ -55,8 +56,8 @@ def test_an_automatic_fence_leaves_its_room_however_the_formation_turns(
     }
     scenario = structure_scenario(tree, "here")
     formation = build_formation(scenario)
-    low, high = fence_box(scenario, formation)
-    around = np.vstack([formation.rest, np.zeros(3)]) @ heading(yaw if turns else 0.0).T
+    low, high = map(np.array, fence_box(scenario, formation))
+    around = np.vstack([rest_of(formation), np.zeros(3)]) @ heading(yaw if turns else 0.0).T
     around[:, :2] += home
     assert (around[:, :2] >= low[:2] + room - 1e-9).all()
     assert (around[:, :2] <= high[:2] - room + 1e-9).all()
@@ -67,7 +68,7 @@ def test_an_automatic_fence_leaves_its_room_however_the_formation_turns(
 def test_a_corner_that_is_given_stands_and_the_other_is_found() -> None:
     tree = {"fence": {"min": [-9.0, -8.0, -7.0], "room": 1.0}, "hand": {"follow_yaw": False}}
     scenario = structure_scenario(tree, "here")
-    low, high = fence_box(scenario, build_formation(scenario))
+    low, high = map(np.array, fence_box(scenario, build_formation(scenario)))
     assert low == pytest.approx([-9.0, -8.0, -7.0])
     assert high == pytest.approx([1.0, 1.5, 3.2])
 
@@ -86,9 +87,9 @@ def test_the_goal_formation_of_a_clamped_hand_fits(
     scenario = structure_scenario(tree, "here")
     formation = build_formation(scenario)
     settings = hand_settings(scenario, formation)
-    low, high = fence_box(scenario, formation)
+    low, high = map(np.array, fence_box(scenario, formation))
     mapped = np.clip(np.array(hand), settings.low, settings.high)
-    goals = mapped + formation.rest @ heading(yaw).T
+    goals = mapped + rest_of(formation) @ heading(yaw).T
     # A box that is smaller than the turning circle leaves the hand one point: its middle.
     fits = high[:2] - low[:2] >= 2.0 * (formation.radius + scenario.fence.margin)
     inside = (goals[:, :2] >= low[:2] + 0.15 - 1e-9) & (goals[:, :2] <= high[:2] - 0.15 + 1e-9)
@@ -98,7 +99,7 @@ def test_the_goal_formation_of_a_clamped_hand_fits(
 def test_every_agent_gets_the_same_fence() -> None:
     scenario = load_scenario("rhombus")
     formation = build_formation(scenario)
-    low, high = fence_box(scenario, formation)
+    low, high = map(np.array, fence_box(scenario, formation))
     for drone in formation.ids:
         steering = agent_settings(scenario, formation, drone).steering
         assert steering.low == pytest.approx(low + np.array([0.15, 0.15, 0.0]))

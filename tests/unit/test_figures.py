@@ -6,6 +6,7 @@ import pytest
 
 from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.record import Record
+from shared.arrays import rest_of
 from shared.config import load_scenario
 from shared.formation import build_formation
 from tests.hands import stroke
@@ -75,7 +76,7 @@ def test_figure_8_the_formation_stretches_along_its_motion() -> None:
 def test_figure_9_the_formation_returns_to_its_rest_shape() -> None:
     record = fly(np.pi / 3.0, 0.6, after=14.0)
     shape = record.position[-1, :, :2] - record.hand.position[-1, :2]
-    assert shape == pytest.approx(record.formation.rest[:, :2], abs=0.05)
+    assert shape == pytest.approx(rest_of(record.formation)[:, :2], abs=0.05)
     widest = np.linalg.norm(record.position[:, 1] - record.position[:, 2], axis=1)
     assert widest[-1] == pytest.approx(1.0, abs=0.05)
 
@@ -83,6 +84,6 @@ def test_figure_9_the_formation_returns_to_its_rest_shape() -> None:
 def test_the_paper_law_lags_more_with_every_hop() -> None:
     record = fly(FORWARD, 0.5, length=1.5)
     middle = np.searchsorted(np.abs(record.hand.position[:, 0]), 0.75)
-    behind = record.position[middle, :, 0] - (record.hand.position[middle, 0] + record.formation.rest[:, 0])
+    behind = record.position[middle, :, 0] - (record.hand.position[middle, 0] + rest_of(record.formation)[:, 0])
     assert behind[0] < behind[1] < behind[3]
     assert behind[1] == pytest.approx(behind[2], abs=1e-6)

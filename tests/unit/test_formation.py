@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shared.arrays import offsets_of, rest_of, weights_of
 from shared.config import SCENARIOS, load_scenario, structure_scenario
 from shared.errors import ConfigError
 from shared.formation import PAPER_MAX_DEPTH, Formation, build_formation
@@ -46,16 +47,15 @@ def check(formation: Formation) -> None:
     """What holds for every formation."""
     n = len(formation.ids)
     assert formation.ids == tuple(sorted(formation.ids))
-    assert formation.weights.shape == (n, n + 1)
-    assert (formation.weights >= 0).all()
-    assert formation.weights.sum(axis=1) == pytest.approx(np.ones(n))
+    weights, rest = weights_of(formation), rest_of(formation)
+    assert (weights >= 0).all()
+    assert weights.sum(axis=1) == pytest.approx(np.ones(n))
     level_of = {row: depth for depth, level in enumerate(formation.levels) for row in level}
     assert sorted(level_of) == list(range(n))
     for row in range(n):
-        parents = np.flatnonzero(formation.weights[row, 1:]).tolist()
+        parents = np.flatnonzero(weights[row, 1:]).tolist()
         assert level_of[row] == max((level_of[parent] + 1 for parent in parents), default=0)
-    positions = np.vstack([np.zeros(3), formation.rest])
-    assert formation.weights @ positions + formation.offsets == pytest.approx(formation.rest)
+    assert weights @ np.vstack([np.zeros(3), rest]) + offsets_of(formation) == pytest.approx(rest)
     assert formation.radius == pytest.approx(max(math.hypot(x, y) for x, y, _ in formation.rest))
     for drone in formation.ids:
         ancestors = formation.ancestors(drone)
@@ -81,7 +81,7 @@ def test_every_shape_is_a_formation_of_n_distinct_places(shape: str, n: int) -> 
 @pytest.mark.parametrize("n", [1, 2, 7, 32])
 def test_a_line_goes_ahead_of_the_hand(n: int) -> None:
     formation = formation_of("line", n, spacing=0.4)
-    assert formation.rest == pytest.approx(np.array([[-0.4 * i, 0.0, 0.0] for i in range(1, n + 1)]))
+    assert rest_of(formation) == pytest.approx(np.array([[-0.4 * i, 0.0, 0.0] for i in range(1, n + 1)]))
     assert formation.depth == n
 
 
@@ -89,7 +89,7 @@ def test_a_line_goes_ahead_of_the_hand(n: int) -> None:
 def test_a_vee_has_a_tip_and_two_arms(n: int) -> None:
     formation = formation_of("vee", n, spacing=0.4, width=0.6)
     places = [(-0.4 * (1 + i // 2), 0.6 * (i // 2) * (1 if i % 2 == 0 else -1), 0.0) for i in range(1, n + 1)]
-    assert formation.rest == pytest.approx(np.array(places))
+    assert rest_of(formation) == pytest.approx(np.array(places))
 
 
 @pytest.mark.parametrize(("n", "columns"), [(9, None), (9, 3), (10, 4), (12, 5), (5, 1), (7, 2)])
@@ -97,7 +97,7 @@ def test_a_grid_is_centred_rows(n: int, columns: int | None) -> None:
     formation = formation_of("grid", n, **({} if columns is None else {"columns": columns}))
     wide = columns or math.ceil(math.sqrt(n))
     for row, indices in itertools.groupby(range(n), lambda i: i // wide):
-        places = formation.rest[list(indices)]
+        places = rest_of(formation)[list(indices)]
         assert places[:, 0] == pytest.approx(np.full(len(places), -0.5 * (row + 1)))
         if len(places) == wide:
             across = sorted(places[:, 1])
@@ -107,11 +107,11 @@ def test_a_grid_is_centred_rows(n: int, columns: int | None) -> None:
 
 def test_the_rhombus_is_equations_11_to_13() -> None:
     formation = build_formation(load_scenario("rhombus"))
-    assert formation.weights == pytest.approx(
+    assert weights_of(formation) == pytest.approx(
         np.array([[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, 1, 0, 0, 0], [0, 0, 0.5, 0.5, 0]])
     )
     offsets = [[-0.5, 0.0, 0.0], [-0.5, 0.5, 0.0], [-0.5, -0.5, 0.0], [-0.5, 0.0, 0.0]]
-    assert formation.offsets == pytest.approx(np.array(offsets))
+    assert offsets_of(formation) == pytest.approx(np.array(offsets))
     assert [link.name for link in formation.links] == ["human-1", "1-2", "1-3", "2-4", "3-4"]
     assert formation.levels == ((0,), (1, 2), (3,))
     assert formation.correction_scale == 1.0

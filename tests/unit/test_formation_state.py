@@ -24,8 +24,9 @@ from glove_bridge.formation_state import (
 from glove_bridge.meaning import MEANINGS, advice_pattern, state_pattern
 from glove_bridge.rules import RULES
 from glove_bridge.rules.thresholds import Thresholds
+from shared.arrays import Vec, rest_of
 from shared.config import load_scenario
-from shared.formation import Formation, Vec, build_formation
+from shared.formation import Formation, build_formation
 from shared.scenario import FormationSettings, Scenario, Shape
 
 LIMITS = Thresholds()
@@ -48,7 +49,7 @@ EVERY_RULE = pytest.mark.parametrize("rule", sorted(RULES))
 
 def default(formation: Formation, hand: tuple[float, float] = (0.0, 0.0)) -> Scene:
     """The formation at rest around a hand, exactly in its default shape."""
-    place = formation.rest[:, :2] + np.array(hand)
+    place = rest_of(formation)[:, :2] + np.array(hand)
     return Scene(position=place, velocity=np.zeros_like(place), goal=place, setpoint=place, yaw=0.0)
 
 
@@ -162,7 +163,7 @@ def test_a_missing_drone_is_left_out_of_the_default_too() -> None:
     for gone in RHOMBUS.ids:
         ids = [drone for drone in RHOMBUS.ids if drone != gone]
         rows = [RHOMBUS.row(drone) for drone in ids]
-        place = RHOMBUS.rest[rows, :2]
+        place = rest_of(RHOMBUS)[rows, :2]
         scene = Scene(position=place, velocity=0 * place, goal=place, setpoint=place, yaw=0.0)
         for rule in RULES.values():
             reading, _ = rule(default_geometry(RHOMBUS, ids), scene, Memory(), LIMITS)
@@ -210,11 +211,11 @@ def flights(draw: st.DrawFn) -> Flown:
     formation = draw(st.sampled_from(FORMATIONS))
     count = len(formation.ids)
     random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    place, amount = formation.rest[:, :2] * draw(st.floats(0.6, 1.6)), draw(st.floats(0.01, 0.3))
+    place, amount = rest_of(formation)[:, :2] * draw(st.floats(0.6, 1.6)), draw(st.floats(0.01, 0.3))
     scene = Scene(
         position=place + amount * random.normal(size=(count, 2)),
         velocity=draw(st.floats(-1, 1)) * (place - place.mean(axis=0)) + random.normal(size=2),
-        goal=formation.rest[:, :2] + 0.1 * amount * random.normal(size=(count, 2)),
+        goal=rest_of(formation)[:, :2] + 0.1 * amount * random.normal(size=(count, 2)),
         setpoint=place + amount * random.normal(size=(count, 2)),
         yaw=0.0,
     )

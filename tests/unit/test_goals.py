@@ -16,6 +16,7 @@ from agents.control.hand import MappedHand
 from agents.control.impedance import AT_REST, LinkState
 from agents.control.vectors import ORIGIN, Vector
 from agents.settings import drone_row
+from shared.arrays import offsets_of, weights_of
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
 from shared.messages import Mode
@@ -141,12 +142,12 @@ def test_the_rows_are_those_of_the_matrix(shape: str, law: str, seed: int, yaw: 
     overrides = (f"swarm.law={law}", "formation.n=4")
     formation = formation_of(shape, *overrides)
     references, states = random_case(formation, seed)
-    corrections = np.zeros_like(formation.offsets)
+    corrections = np.zeros((len(formation.ids), 3))
     for link in formation.links:
         corrections[link.target] += np.clip(states[link.name].displacement, -link.limit, link.limit)
     corrections[:, 0] = -np.abs(corrections[:, 0])
-    places = formation.offsets + formation.correction_scale * corrections
-    expected = formation.weights @ references + places @ about_z(yaw).T
+    places = offsets_of(formation) + formation.correction_scale * corrections
+    expected = weights_of(formation) @ references + places @ about_z(yaw).T
     assert np.allclose(
         solve(scenario_of(shape, *overrides), formation, references, states, yaw)[0], expected, atol=1e-12
     )

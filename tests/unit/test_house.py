@@ -131,9 +131,9 @@ def loaded_by(module: str) -> set[str]:
 def test_a_flying_process_loads_nothing_heavy(module: str) -> None:
     loaded = loaded_by(module)
     heavy = {"rich", "rosbags", "matplotlib", "scipy", "cryptography", "mcap", "websockets", "http", "asyncio"}
-    heavy |= {"starlette", "uvicorn"}
+    heavy |= {"starlette", "uvicorn", "numpy"}
     assert loaded & heavy == set()
-    assert {"zenoh", "numpy"} <= loaded
+    assert "zenoh" in loaded
 
 
 def test_the_control_law_loads_without_bus_or_threads_of_ours() -> None:

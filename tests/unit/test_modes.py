@@ -159,6 +159,7 @@ any_inputs = st.builds(
     wish=wishes,
     hand_age=ages,
     pose_age=ages,
+    battery=st.sampled_from([0.05, 0.15, 1.0]) | st.floats(0.0, 1.0),
     height=st.sampled_from([0.0, 0.05, 0.07, 1.0, 1.15]) | st.floats(-1.0, 3.0),
     takeoff_height=st.just(TAKEOFF_HEIGHT),
     references_follow=st.booleans(),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from human_relay.pointing import Limits, PointerState, advance, hear, is_watched, pursue
 from shared.clock import NS_PER_S
 from shared.errors import DecodeError
-from shared.messages import MAX_POSITION, Wish
+from shared.messages import MAX_POSITION, ORIGIN, Wish
 from shared.pointer_link import SILENT_S, Pointed, Verb, decode_pointed, encode_pointed
 
 LIMITS = Limits(speed=0.75, acceleration=3.0)
@@ -71,24 +71,24 @@ def test_a_wrong_datagram_is_refused_with_its_reason(datagram: bytes, reason: st
 def test_a_jumping_pointer_moves_the_hand_within_its_limits(
     jumps: list[tuple[tuple[float, float, float], float]],
 ) -> None:
-    position, velocity = np.zeros(3), np.zeros(3)
+    position, velocity = ORIGIN, ORIGIN
     for target, dt in jumps:
         before, was = position, velocity
-        position, velocity = pursue(position, velocity, np.array(target), dt, LIMITS)
-        assert np.linalg.norm(velocity) <= LIMITS.speed + 1e-9
-        assert np.linalg.norm(velocity - was) <= LIMITS.acceleration * dt + 1e-9
-        assert np.allclose(position - before, velocity * dt)
+        position, velocity = pursue(position, velocity, target, dt, LIMITS)
+        assert math.hypot(*velocity) <= LIMITS.speed + 1e-9
+        assert math.dist(velocity, was) <= LIMITS.acceleration * dt + 1e-9
+        assert np.allclose(np.subtract(position, before), np.multiply(velocity, dt))
 
 
 @given(points)
 def test_the_hand_arrives_and_rests(target: tuple[float, float, float]) -> None:
-    position, velocity = np.zeros(3), np.zeros(3)
+    position, velocity = ORIGIN, ORIGIN
     way = math.hypot(*target)
     for _ in range(round(60 * (way / LIMITS.speed + 2.0))):
-        position, velocity = pursue(position, velocity, np.array(target), 1 / 60, LIMITS)
-        assert np.linalg.norm(position) <= way + 0.02, "it brakes in time"
-    assert np.allclose(position, target, atol=1e-3)
-    assert np.linalg.norm(velocity) < 1e-2
+        position, velocity = pursue(position, velocity, target, 1 / 60, LIMITS)
+        assert math.hypot(*position) <= way + 0.02, "it brakes in time"
+    assert position == pytest.approx(target, abs=1e-3)
+    assert math.hypot(*velocity) < 1e-2
 
 
 def held(*steps: tuple[int, Pointed]) -> PointerState:

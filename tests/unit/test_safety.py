@@ -14,6 +14,7 @@ from attrs import evolve
 
 from agents.control.avoidance import COLUMN_BUBBLE
 from deploy.lockstep.lockstep import fly_lockstep
+from shared.arrays import rest_of, weights_of
 from shared.config import load_scenario
 from shared.formation import build_formation
 from shared.messages import HandSample
@@ -105,7 +106,7 @@ def wall(scenario: Scenario, angle: float) -> tuple[Scenario, Vec]:
     """A row of columns 0.3 m apart, 0.7 m in front of the formation, turned by an angle (rad)."""
     ahead = np.array([-math.cos(angle), math.sin(angle)])
     along = np.array([ahead[1], -ahead[0]])
-    distance = (build_formation(scenario).rest[:, :2] @ ahead).max() + 0.7
+    distance = (rest_of(build_formation(scenario))[:, :2] @ ahead).max() + 0.7
     places = ahead * distance + along * np.arange(-2.7, 2.71, 0.3)[:, None]
     columns = tuple(Obstacle(name=f"c{k}", x=x, y=y) for k, (x, y) in enumerate(places.tolist()))
     return evolve(scenario, obstacles=columns), places
@@ -150,12 +151,12 @@ def test_the_stable_law_stays_in_shape_at_any_size(shape: str, n: int) -> None:
     """
     scenario = load_scenario(shape, [f"formation.n={n}", ROOM])
     formation = build_formation(scenario)
-    of_drones = formation.weights[:, 0] == 0.0
+    of_drones = weights_of(formation)[:, 0] == 0.0
     hands = [stroke(heading, 1.0, 1.5, after=2.0) for heading in HEADINGS[::3]]
     neighbour = last = 0.0
     for tick in fly_all(scenario, hands):
         error = tick.position - tick.goal
-        relative = error - formation.weights[:, 1:] @ error
+        relative = error - weights_of(formation)[:, 1:] @ error
         neighbour = max(neighbour, np.linalg.norm(relative, axis=2)[:, of_drones].max())
         last = max(last, np.linalg.norm(error, axis=2)[:, list(formation.levels[-1])].max())
     print(f"{shape} of {n}: neighbours {neighbour:.3f} m, last {last:.3f} m")

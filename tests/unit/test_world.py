@@ -19,6 +19,7 @@ from agents.vehicles.world.record import RefereeFile
 from agents.vehicles.world.referee import Rules
 from agents.vehicles.world.setup import plan_world
 from agents.vehicles.world.world import MAX_CATCH_UP, TICK, World
+from shared.arrays import rest_of
 from shared.codec import encode
 from shared.config import structure_scenario
 from shared.errors import ConfigError, DeviceError
@@ -133,7 +134,7 @@ def test_plan_parks_the_formation_at_home() -> None:
     assert setup.address == ("127.0.0.1", 7400)
     assert setup.hovers == {1, 2, 3, 4}
     assert setup.rules.columns == ((5.0, 6.0),)
-    expected = setup.formation.rest[:, :2] + np.array([1.0, 2.0])
+    expected = rest_of(setup.formation)[:, :2] + np.array([1.0, 2.0])
     places = [flyer.body.position for flyer in setup.fleet.values()]
     assert places == [(x, y, 0.0) for x, y in expected.tolist()]
     moved_by = {drone: flyer.model for drone, flyer in setup.fleet.items()}

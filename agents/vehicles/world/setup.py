@@ -63,24 +63,18 @@ def plan_world(scenario: Scenario) -> Setup:
 
 def referee_rules(scenario: Scenario, formation: Formation, ids: tuple[int, ...]) -> Rules:
     """Returns what the referee counts for some drones of a scenario."""
-    low, high = fence_box(scenario, formation)
     return Rules(
         ids=ids,
         columns=tuple((o.x, o.y) for o in scenario.obstacles),
         column_radius=scenario.avoidance.columns.radius,
-        fence=(_corner(low.tolist()), _corner(high.tolist())),
+        fence=fence_box(scenario, formation),
     )
 
 
 def _place(scenario: Scenario, formation: Formation, drone: int) -> Vector:
     """Returns the place on the ground below a drone's in the rest formation at home, m."""
-    (x, y, _), (home_x, home_y) = formation.rest[formation.row(drone)].tolist(), scenario.hand.home
+    (x, y, _), (home_x, home_y) = formation.rest[formation.row(drone)], scenario.hand.home
     return (x + home_x, y + home_y, 0.0)
-
-
-def _corner(numbers: list[float]) -> Vector:
-    x, y, z = numbers
-    return (x, y, z)
 
 
 def _address(uris: dict[int, str]) -> tuple[str, int]:

@@ -37,7 +37,7 @@ def _arrows(record: FlightRecord, row: int) -> Iterator[tuple[int, int, list[flo
     """Yields reference (0 is the hand), index of the drone, and both ends (x, y, z) of every arrow."""
     places = np.vstack([record.mapped[row], record.position[row]]).tolist()
     for drone, weights in enumerate(record.formation.weights):
-        for reference in np.flatnonzero(weights).tolist():
+        for reference in (column for column, weight in weights.items() if weight):
             yield reference, drone, places[reference], places[drone + 1]
 
 

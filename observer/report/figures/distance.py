@@ -1,5 +1,6 @@
 """Distance between the first and the last drone: how far the formation is stretched."""
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +35,7 @@ def _distance(record: FlightRecord) -> Vec:
 
 
 def _default(record: FlightRecord) -> float:
-    return float(np.linalg.norm(record.formation.rest[-1] - record.formation.rest[0]))
+    return math.dist(record.formation.rest[-1], record.formation.rest[0])
 
 
 DISTANCE = Drawing(
