@@ -1,6 +1,7 @@
 """Quantiles of a stream of positive numbers in fixed memory."""
 
 import math
+from collections import Counter
 from typing import NamedTuple
 
 _SMALLEST = 1e-3
@@ -17,10 +18,13 @@ class Quantiles(NamedTuple):
 
 
 class Histogram:
-    """Counts numbers in logarithmic bins from 1e-3 to 1e5, 1.2 % wide; what lies outside goes to the ends."""
+    """Counts numbers in logarithmic bins from 1e-3 to 1e5, 1.2 % wide; what lies outside goes to the ends.
+
+    Only bins that hold something take memory: there may be one for every link that anybody claims to have.
+    """
 
     def __init__(self) -> None:
-        self._counts = [0] * (_LAST + 1)
+        self._counts: Counter[int] = Counter()
         self._total = 0
 
     def add(self, value: float) -> None:
@@ -33,9 +37,9 @@ class Histogram:
         """Returns the number below which `fraction` (0..1) of all lie, None if there are none."""
         wanted = fraction * self._total
         seen = 0
-        for index, count in enumerate(self._counts):
-            seen += count
-            if count and seen >= wanted:
+        for index in sorted(self._counts):
+            seen += self._counts[index]
+            if seen >= wanted:
                 return float(_SMALLEST * 10.0 ** ((index + 0.5) / _BINS_PER_DECADE))
         return None
 

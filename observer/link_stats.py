@@ -20,9 +20,12 @@ from shared.messages import DroneState, FormationState, Heard, Message, ProcessS
 from shared.nodes import OBSERVER
 from shared.order import AHEAD, check_newer
 from shared.topics import parse_key, rank
+from shared.transport import TOO_MANY
 
 OTHER_KEYS = "other keys"
 """Stands for every key that is of no topic."""
+MOST_LINKS = 16_384
+"""Of a thousand drones there are a third as many; what is made up beyond is counted together, as `TOO_MANY`."""
 _STALE_S = 2.0
 """A publisher that goes on further back after so long a silence has been restored, and is not late."""
 _REMEMBERED = 1024
@@ -158,8 +161,12 @@ class SwarmLinks:
     def add(self, key: str, message: Message, arrival_ns: int) -> None:
         """Counts one valid message; what it says it heard must have been added before, to have an age."""
         sample = Heard(message.epoch, message.seq, arrival_ns)
+        link = self._link(key, OBSERVER)
+        if link is None:
+            self.reject(key, TOO_MANY)
+            return
         try:
-            self._link(key, OBSERVER).add(sample, message.stamp_ns)
+            link.add(sample, message.stamp_ns)
         except DecodeError as error:
             self.reject(key, error.reason)
             return
@@ -179,7 +186,7 @@ class SwarmLinks:
 
         Those on keys of no topic share one: anybody may make up any number of them.
         """
-        shown = key if _is_ours(key) else OTHER_KEYS
+        shown = key if _is_ours(key) and self._link(key, OBSERVER) else OTHER_KEYS
         self.rejected[shown][reason] += 1
         self._link(shown, OBSERVER)
 
@@ -190,16 +197,18 @@ class SwarmLinks:
 
     def _add_heard(self, listener: str, heard: Mapping[str, Heard]) -> None:
         for key, sample in heard.items():
-            if not _is_ours(key):
+            link = self._link(key, listener) if _is_ours(key) else None
+            if link is None:
                 continue
             stamps = self._stamps.get(key, {})
             # Numbers that its listener makes up are no reason to doubt the message.
             with contextlib.suppress(DecodeError):
-                self._link(key, listener).uses(sample, stamps.get((sample.epoch, sample.seq)))
+                link.uses(sample, stamps.get((sample.epoch, sample.seq)))
 
-    def _link(self, key: str, listener: str) -> LinkStats:
+    def _link(self, key: str, listener: str) -> LinkStats | None:
+        """Returns what has been counted of a link, None if there are too many."""
         link = self._links.get((key, listener))
-        if link is None:
+        if link is None and (len(self._links) < MOST_LINKS or key == OTHER_KEYS):
             link = self._links[key, listener] = LinkStats()
         return link
 

@@ -37,7 +37,7 @@ from shared.radio import Receiver, Transmitter
 from shared.radio_link import radio_group
 from shared.scenario import Scenario
 from shared.topics import ALIVE, Delivery, Topic, parse_presence
-from shared.transport import Bus, Inbox, Publish
+from shared.transport import MOST_KEYS, Bus, Inbox, Publish
 
 CLOSE_TIMEOUT_S = 1.0
 """Closing waits for every attempt to dial somebody who is not there; after this long it is left to itself."""
@@ -137,14 +137,20 @@ class ZenohBus:
 
     def watch_presence(self, on_change: Callable[[str, bool], None]) -> None:
         """See `Bus.watch_presence`."""
+        here: set[str] = set()
 
         def changed(sample: zenoh.Sample) -> None:
+            present = sample.kind == zenoh.SampleKind.PUT
             try:
                 token = parse_presence(str(sample.key_expr))
             except DecodeError:
-                self._foreign_tokens += sample.kind == zenoh.SampleKind.PUT
+                self._foreign_tokens += present
                 return
-            on_change(token, sample.kind == zenoh.SampleKind.PUT)
+            if present and len(here) >= MOST_KEYS and token not in here:
+                self._foreign_tokens += 1
+            elif present or token in here:
+                (here.add if present else here.discard)(token)
+                on_change(token, present)
 
         watcher = self._session.liveliness().declare_subscriber(f"{_ALIVE_PREFIX}**", changed, history=True)
         self._declared.append(watcher)

@@ -17,7 +17,9 @@ Publish = Callable[[bytes], None]
 PENDING_PER_KEY = 8
 """How many samples of one key an inbox keeps: the newest counts, a few older ones survive garbage."""
 MOST_KEYS = 4096
-"""How many keys at once: who hears a wildcard hears whatever keys anybody makes up."""
+"""How many keys at once, or processes: who hears a wildcard hears whatever keys anybody makes up."""
+TOO_MANY = "too-many-keys"
+"""By this reason whoever keeps something per key counts what he cannot keep."""
 
 
 class Arrival(NamedTuple):

@@ -13,7 +13,7 @@ from shared.messages import DroneState, HandSample, Heard, Message, Mode, Patter
 from shared.nodes import RELAY
 from shared.order import check_newer
 from shared.topics import DRONE_STATE, HAND, PATTERN, STATUS, topic_of
-from shared.transport import Bus, Inbox
+from shared.transport import MOST_KEYS, TOO_MANY, Bus, Inbox
 
 INBOX_DEPTH = 4096
 """Samples kept per key between two drains: a minute of them, so that the statistics miss none."""
@@ -66,7 +66,7 @@ class Monitor:
                     case PatternEvent():
                         self.glove.add(message)
                     case ProcessStatus():
-                        self.health.setdefault(f"{message.role}/{message.id}", Health()).add(message)
+                        self._add_status(f"{message.role}/{message.id}", message)
                     case _:
                         pass
         self.asked |= any(hand.mode is Wish.FLY for hand in hands)
@@ -102,6 +102,12 @@ class Monitor:
             if (last := self._newest.get(key)) is not None:
                 check_newer(sample, last, topic_of(key).stale_s)
             self._newest[key] = sample
+
+    def _add_status(self, token: str, status: ProcessStatus) -> None:
+        if token not in self.health and len(self.health) >= MOST_KEYS:
+            self.rejected[TOO_MANY] += 1
+            return
+        self.health.setdefault(token, Health()).add(status)
 
     def _presence_changed(self, token: str, present: bool) -> None:
         """Called by the bus, on its thread: single set operations only."""

@@ -28,7 +28,7 @@ from shared.nodes import WORLD
 from shared.plain_text import plain
 from shared.senses import Sensed, Senses
 from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, STATUS
-from shared.transport import Arrival
+from shared.transport import MOST_KEYS, TOO_MANY, Arrival
 
 Frames = Mapping[str, Sequence[Json]]
 """Pattern name -> frames `{ms, hz: {finger: Hz}}`."""
@@ -100,7 +100,7 @@ class SwarmView:
                     case FormationState():
                         self._formation = Sensed(message, arrival_ns)
                     case ProcessStatus():
-                        self._statuses[f"{message.role}/{message.id}"] = Sensed(message, arrival_ns)
+                        self._add_status(Sensed(message, arrival_ns))
                     case _:
                         pass
         return events
@@ -150,6 +150,13 @@ class SwarmView:
         if event.outcome != "suppressed":
             self._playing = sensed if event.outcome == "started" else None
         return self._describe(event, now_ns)
+
+    def _add_status(self, sensed: Sensed[ProcessStatus]) -> None:
+        token = f"{sensed.message.role}/{sensed.message.id}"
+        if token not in self._statuses and len(self._statuses) >= MOST_KEYS:
+            self.rejected[TOO_MANY] += 1
+            return
+        self._statuses[token] = sensed
 
     def _describe(self, event: PatternEvent, now_ns: int) -> Json:
         started = event.outcome == "started" and event.started_ns > 0

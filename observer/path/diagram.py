@@ -6,6 +6,7 @@ from html import escape
 
 from observer.colours import COLOURS, HAND
 from observer.path.hop import GLOVE_NODE, HAND_NODE, Effect, HandPath, Hop, Part
+from shared.plain_text import plain
 
 _WIDTH, _LEFT, _RIGHT = 960, 90, 110
 _TOP, _LANE, _BAR = 76, 58, 14
@@ -93,7 +94,7 @@ class _Diagram:
     def _bars(self, effect: Effect) -> Iterator[str]:
         y = self._y(effect.node)
         late_ms = self._path.latency_ns(effect.node) / 1e6
-        text = f"{late_ms:.2f} ms" + (f", {effect.pattern}" if effect.pattern else "")
+        text = f"{late_ms:.2f} ms" + (f", {plain(effect.pattern)}" if effect.pattern else "")
         if not effect.inputs or not self._fits(effect.inputs[0]):
             yield f'<text x="{_WIDTH - _RIGHT - 8}" y="{y - 6}" text-anchor="end">later: {escape(text)}</text>'
             return

@@ -23,6 +23,7 @@ from shared.formation import build_formation
 from shared.memory_bus import MemoryBus, MemoryNetwork
 from shared.messages import ORIGIN, DroneState, Flag, HandSample, Heard, Mode, ProcessStatus, Wish
 from shared.topics import DRONE_STATE, HAND, STATUS
+from shared.transport import MOST_KEYS, TOO_MANY
 
 FORMATION = build_formation(load_scenario("rhombus"))
 NO_FLAGS = Flag(0)
@@ -199,6 +200,22 @@ def test_whatever_key_is_put_the_monitor_goes_on() -> None:
         swarm.monitor._inbox.put(key, b"\xc0")
     assert swarm.say(state(1)).stats.latest.keys() == {1}
     assert swarm.monitor.rejected == {"unknown-key": len(keys)}
+
+
+def test_made_up_processes_do_not_fill_the_memory() -> None:
+    swarm = Swarm()
+    for number in range(2 * MOST_KEYS):
+        made_up = replace(status(1), role="observer", id=number)
+        swarm.bus.publisher(STATUS, role="observer", id=number)(encode(made_up))
+        if number % 1000 == 0:
+            swarm.monitor.drain()
+    swarm.monitor.drain()
+    assert len(swarm.monitor.health) == MOST_KEYS
+    assert swarm.monitor.rejected[TOO_MANY] > 1000
+    swarm.say(replace(status(1), role="observer", id=0, cpu=0.75))
+    newest = swarm.monitor.health["observer/0"].status
+    assert newest is not None
+    assert newest.cpu == 0.75
 
 
 def test_nobody_speaks_for_another() -> None:

@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from observer.link_stats import OTHER_KEYS, LinkStats, LinkSummary, SwarmLinks
+from observer.link_stats import MOST_LINKS, OTHER_KEYS, LinkStats, LinkSummary, SwarmLinks
 from shared.messages import Heard
 from shared.nodes import OBSERVER
 from shared.topics import DRONE_STATE, HAND
+from shared.transport import TOO_MANY
 from tests.traces import hand, state
 
 MS = 1_000_000
@@ -92,6 +93,16 @@ def test_keys_that_are_made_up_have_one_row() -> None:
         (HAND.key(), "drone/2"),
     ]
     assert swarm.rejected[OTHER_KEYS] == {"unknown-key": 1000}
+
+
+def test_invented_keys_and_listeners_do_not_fill_the_memory() -> None:
+    swarm, key = SwarmLinks(), DRONE_STATE.key(id=1)
+    for number in range(300):
+        heard = {DRONE_STATE.key(id=1 + 100 * number + k): Heard(1, 1, 1) for k in range(100)}
+        swarm.add(key, state(1, number, heard=heard), number * PERIOD)
+        swarm.add(DRONE_STATE.key(id=2 + number), state(2 + number, 0), number * PERIOD)
+    assert len(swarm.rows()) <= MOST_LINKS + 1
+    assert swarm.rejected[OTHER_KEYS][TOO_MANY] > 100
 
 
 def test_a_long_gap_costs_no_memory() -> None:
