@@ -8,6 +8,7 @@ import ctypes
 import json
 import logging
 import os
+import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -249,15 +250,21 @@ def routing(listen: str) -> Iterator[None]:
         session.close()  # type: ignore[no-untyped-call]  # as above
 
 
+def _reason(error: zenoh.ZError) -> str:
+    """Returns what Zenoh says, without the places in its sources at which it says so."""
+    return re.sub(r"\.? at [^\s\]]+\.rs:\d+\.*", "", str(error)).strip(" .")
+
+
 def _open(settings: Settings) -> zenoh.Session:
     try:
         return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
         if settings["mode"] == "client":
-            raise DeviceError(f"no router: {error}. Does one run where net.router says?") from error
+            raise DeviceError(f"no router: {_reason(error)}. Does one run where net.router says?") from error
         where = ", ".join(settings["listen"]["endpoints"]) or "no endpoint"
         raise DeviceError(
-            f"cannot open the bus at {where}: {error}. Is the port in use? Set net.endpoints or net.base_port"
+            f"cannot open the bus at {where}: {_reason(error)}. Is the port in use? Set net.endpoints or"
+            " net.base_port"
         ) from error
 
 

@@ -132,7 +132,9 @@ _VEHICLE_DEFAULTS = VehicleSettings(
 def _apply_override(tree: dict[str, Any], item: str) -> None:
     key, separator, text = item.partition("=")
     if not separator or not key.strip():
-        raise ConfigError(f"--set {item}: expected key=value, for example --set formation.n=8")
+        raise ConfigError(
+            f"--set {item}: expected key=value, for example --set formation.n=8 (SWARMTOUCH_SET counts)"
+        )
     try:
         value = parse_toml(f"value = {text}", item)["value"]
     except ConfigError:

@@ -17,7 +17,9 @@ from shared.codec import encode
 from shared.compiled import form
 from shared.errors import ConfigError, SwarmTouchError
 from shared.messages import ProcessStatus
+from shared.overrides import split_overrides
 from shared.plain_text import plain
+from shared.standard_streams import settle_streams
 from shared.topics import STATUS
 from shared.transport import Bus
 from shared.watchdog import feed_watchdog
@@ -53,6 +55,7 @@ def prepare_process(name: str, *, verbose: bool = False) -> threading.Event:
     Returns:
         An event that SIGTERM, SIGINT or SIGHUP (the terminal is gone; not with `nohup`) sets: the loop ends.
     """
+    settle_streams()
     _share_one_arena()
     line = f"%(asctime)s.%(msecs)03d {name} %(levelname)s %(name)s: %(message)s"
     handler = logging.StreamHandler()
@@ -94,9 +97,9 @@ def add_process_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set",
         action="append",
-        default=os.environ.get(OVERRIDES, "").split(),
+        default=split_overrides(os.environ.get(OVERRIDES, "")),
         metavar="KEY=VALUE",
-        help=f"override a key; also those in ${OVERRIDES}, with spaces between",
+        help=f"override a key; also those in ${OVERRIDES}, with spaces between, but in quotes and brackets",
     )
     parser.add_argument("-v", "--verbose", action="store_true", help="log debugging details")
 

@@ -1,5 +1,6 @@
 """What a scenario may say: one frozen class per TOML table, with its defaults and single-value checks."""
 
+import re
 from typing import Any, Literal
 
 from attrs import Attribute, Factory, field, frozen
@@ -13,6 +14,7 @@ MAX_PORT = 65_535
 SLOWEST_HAND = 10.0
 """A hand is stale after 0.25 s: at this rate one sample may be lost, Hz."""
 
+_ENDPOINT = re.compile(r"[a-z][a-z-]*/[^\s?#]*?(:(?P<port>[0-9]{1,20}))?([?#].*)?")
 Law = Literal["paper", "stable"]
 Profile = Literal["laptop", "compose", "field", "radio"]
 Shape = Literal["rhombus", "triangle", "line", "vee", "grid", "custom"]
@@ -34,6 +36,22 @@ def _hand_rate(_: Any, attribute: "Attribute[Any]", value: float) -> None:
             f"{attribute.name} must be {SLOWEST_HAND:g} to {FASTEST_HZ} Hz, not {value!r}:"
             " a slower hand is stale before the next sample comes"
         )
+
+
+def _port(_: Any, attribute: "Attribute[Any]", value: int) -> None:
+    if not 0 <= value <= MAX_PORT:
+        raise ValueError(f"{attribute.name} must be a port from 0 to {MAX_PORT}, not {value!r}")
+
+
+def check_endpoint(key: str, endpoint: str) -> None:
+    """Looks whether a Zenoh endpoint has a protocol, and no port that is none.
+
+    Raises:
+        ValueError: With the key.
+    """
+    match = _ENDPOINT.fullmatch(endpoint)
+    if not match or (match["port"] and int(match["port"]) > MAX_PORT):
+        raise ValueError(f"{key} {endpoint!r}: expected PROTOCOL/HOST:PORT, for example tcp/10.0.0.2:7447")
 
 
 def _check_box(low: "Triple | Pair", high: "Triple | Pair") -> None:
@@ -354,7 +372,7 @@ class Net:
     """
 
     profile: Profile = "laptop"
-    base_port: int = field(default=7460, validator=_positive)
+    base_port: int = field(default=7460, validator=_port)
     endpoint: str | None = None
     endpoints: dict[str, str] = Factory(dict)
     router: str | None = None
@@ -364,6 +382,12 @@ class Net:
     adminspace: bool = False
     full_mesh: int = field(default=16, validator=_not_negative)
     pointer: str = DEFAULT_SOCKET
+
+    def __attrs_post_init__(self) -> None:
+        named = {f'endpoints."{node}"': text for node, text in self.endpoints.items()}
+        for key, text in {"endpoint": self.endpoint, "router": self.router, **named}.items():
+            if text is not None:
+                check_endpoint(key, text)
 
 
 @frozen(kw_only=True)

@@ -2,13 +2,15 @@
 
 import argparse
 import importlib
+import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Protocol, cast
 
+from deploy.cli.boundary import contain
 from shared.compiled import form
-from shared.errors import SwarmTouchError
-from shared.process import explain
+
+PROGRAM = "swarmtouch"
 
 COMMANDS = {
     "up": "fly a scenario with real processes on this machine",
@@ -46,18 +48,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: Arguments without the program's name, `sys.argv[1:]` by default.
 
     Returns:
-        The exit code: 0 all went well, 1 it did not, 2 refused before anything started.
+        The exit code: 0 all went well, 1 it did not, 2 refused before anything started; the others are in
+        `deploy.cli.boundary`.
     """
+    words = sys.argv[1:] if argv is None else argv
+    return contain(PROGRAM, words, lambda: _run(words))
+
+
+def _run(argv: Sequence[str]) -> int:
     arguments = _parser().parse_args(argv)
-    try:
-        return _load(arguments.command).run(arguments)
-    except SwarmTouchError as error:
-        return explain("swarmtouch", error)
+    return _load(arguments.command).run(arguments)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="swarmtouch",
+        prog=PROGRAM,
         description="Guide a formation of small drones with one hand.",
         epilog="example: swarmtouch up rhombus --seconds 30",
     )

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from deploy.cli.arguments import add_overrides
+from deploy.cli.arguments import add_overrides, count, new_file, seconds, whole
+from shared.messages import MAX_DRONE_ID
 
 DESCRIPTION = """Measures on this machine: latency from the hand to the drones, cost of a control step, many
 agents, the recorder, the simulators, the start. Real swarms and bare ones (same processes, links and payload
@@ -77,7 +78,7 @@ def _common(scenario: str) -> Declare:
         parser.add_argument("--scenario", default=scenario, help="what flies (default: %(default)s)")
         add_overrides(parser)
         parser.add_argument("--json", action="store_true", help="one line of JSON per measurement on stdout")
-        parser.add_argument("--plot", type=Path, metavar="FILE", help="draw it (.svg, .png; needs matplotlib)")
+        parser.add_argument("--plot", type=new_file, metavar="FILE", help="draw it (.svg, .png)")
         parser.add_argument("--update", type=Path, metavar="FILE", help="replace its table in a Markdown file")
 
     return declare
@@ -89,18 +90,8 @@ def _option(name: str, kind: Callable[[str], Any], default: str, text: str) -> D
     )
 
 
-def _positive(kind: type[float] | type[int]) -> Callable[[str], Any]:
-    def parse(text: str) -> float | int:
-        value = kind(text)
-        if not 0 < value < float("inf"):
-            raise argparse.ArgumentTypeError(f"{text} must be more than 0")
-        return value
-
-    return parse
-
-
-def _numbers(text: str) -> tuple[int, ...]:
-    return tuple(_positive(int)(part) for part in text.split(","))
+def _sizes_of(text: str) -> tuple[int, ...]:
+    return tuple(whole(1, MAX_DRONE_ID)(part) for part in text.split(","))
 
 
 def _profile(parser: argparse.ArgumentParser) -> None:
@@ -112,19 +103,19 @@ def _profile(parser: argparse.ArgumentParser) -> None:
 
 
 def _seconds(default: str) -> Declare:
-    return _option("seconds", _positive(float), default, "time that counts, per swarm, s")
+    return _option("seconds", seconds, default, "time that counts, per swarm, s")
 
 
 def _rounds(default: str) -> Declare:
-    return _option("rounds", _positive(int), default, "how often the swarms take turns")
+    return _option("rounds", count, default, "how often the swarms take turns")
 
 
 def _number(default: str) -> Declare:
-    return _option("n", _positive(int), default, "how many are measured")
+    return _option("n", count, default, "how many are measured")
 
 
 def _sizes(name: str, default: str) -> Declare:
-    return _option(name, _numbers, default, "sizes of the swarms")
+    return _option(name, _sizes_of, default, "sizes of the swarms")
 
 
 class Kind(NamedTuple):
@@ -161,8 +152,8 @@ _KINDS = {
         "--agents 12 --seconds 60",
         "grid",
         (
-            _option("agents", _positive(int), "12", "size of the swarm"),
-            _option("seconds", _positive(float), "60", "time that counts, with and without a recorder each, s"),
+            _option("agents", whole(1, MAX_DRONE_ID), "12", "size of the swarm"),
+            _option("seconds", seconds, "60", "time that counts, with and without a recorder each, s"),
             _rounds("3"),
         ),
     ),

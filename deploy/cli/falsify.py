@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from deploy.cli.arguments import add_overrides, count, seconds
+from deploy.cli.arguments import add_overrides, count, new_folder, seconds, whole
 
 DESCRIPTION = """Looks for the flight in which a scenario comes nearest to a collision, to the hand, to a
 column, out of its fence or onto the floor: real agents in lockstep on a virtual clock, with hands up to
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--flights", type=count, metavar="N", help="fly so many instead")
     parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (%(default)s)")
-    parser.add_argument("--jobs", type=count, metavar="N", help="processes (default: one per processor)")
+    parser.add_argument("--jobs", type=whole(1, 1024), metavar="N", help="processes (default: all processors)")
     parser.add_argument(
         "--vary", action="store_true", help="draw body, link-loss rule, law, size and columns as well"
     )
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", type=Path, metavar="FOLDER", help="fly a kept case again instead")
     parser.add_argument(
         "--keep",
-        type=Path,
+        type=new_folder,
         default=Path("runs/falsify"),
         metavar="DIR",
         help="where the worst of each class is kept (default: %(default)s)",

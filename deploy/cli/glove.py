@@ -4,7 +4,7 @@ import argparse
 import importlib
 from pathlib import Path
 
-from deploy.cli.arguments import seconds
+from deploy.cli.arguments import new_file, number, seconds, whole
 
 DESCRIPTION = """Looks at tactile patterns, and sets up a glove. A glove is named as for `swarmtouch up`:
 serial:///dev/ttyACM0, with ?link=xbee by radio, with ?calibration=FILE as calibrated; without --glove it is
@@ -41,13 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for name in ("hello", "buzz", "play", "calibrate"):
         children[name].add_argument("--glove", metavar="URI", help="the glove (default: the only USB port)")
     buzz, play, calibrate, flash = (children[name] for name in ("buzz", "play", "calibrate", "flash"))
-    buzz.add_argument("finger", type=int, choices=range(1, 6), metavar="FINGER", help="1 (thumb) to 5")
-    buzz.add_argument("hz", type=_frequency, metavar="HZ", help="frequency, 50 to 300 Hz")
-    buzz.add_argument("ms", type=_length, metavar="MS", help="length, 20 to 2000 ms")
+    buzz.add_argument("finger", type=whole(1, 5), metavar="FINGER", help="1 (thumb) to 5")
+    buzz.add_argument("hz", type=number(50.0, 300.0), metavar="HZ", help="frequency, 50 to 300 Hz")
+    buzz.add_argument("ms", type=whole(20, 2000), metavar="MS", help="length, 20 to 2000 ms")
     play.add_argument("name", metavar="NAME", help="a pattern, for example EI; `all` for the whole set")
     play.add_argument("--patterns", default="paper", metavar="SET", help="its set (default: %(default)s)")
     calibrate.add_argument(
-        "--output", type=Path, default=Path("glove.toml"), metavar="FILE", help="default: %(default)s"
+        "--output", type=new_file, default=Path("glove.toml"), metavar="FILE", help="default: %(default)s"
     )
     calibrate.add_argument(
         "--turn", type=seconds, default=1.0, metavar="S", help="length of a trial, s (default: %(default)s)"
@@ -68,19 +68,4 @@ def _add_patterns(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("set", nargs="?", metavar="SET", help="name of a set that ships, or a TOML file")
     parser.add_argument("--compare", metavar="SET", help="show the prediction of another set beside")
     parser.add_argument("--play", action="store_true", help="play every pattern on the terminal")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="draw the set as an SVG picture")
-
-
-def _frequency(text: str) -> float:
-    return _within(text, 50.0, 300.0)
-
-
-def _length(text: str) -> int:
-    return int(_within(text, 20.0, 2000.0))
-
-
-def _within(text: str, low: float, high: float) -> float:
-    value = float(text)
-    if not low <= value <= high:
-        raise argparse.ArgumentTypeError(f"{text} must be {low:g} to {high:g}")
-    return value
+    parser.add_argument("--svg", type=new_file, metavar="FILE", help="draw the set as an SVG picture")

@@ -3,9 +3,8 @@
 import argparse
 import json
 import sys
-from pathlib import Path
 
-from deploy.cli.arguments import add_flight_arguments, seconds
+from deploy.cli.arguments import add_flight_arguments, new_file, number
 
 DESCRIPTION = """Flies a scenario in one process on a virtual clock: real agents that exchange messages,
 tick by tick, with simulated bodies. The same inputs give the same bytes. It starts from a hover in the rest
@@ -14,6 +13,8 @@ EXAMPLE = """swarmtouch sim rhombus --seconds 20 --plot rhombus.png
          swarmtouch sim grid --set formation.n=1000 --law central --seconds 5
          swarmtouch sim maze --hand recording:flights/S2_visual_1 --csv maze.csv"""
 
+LONGEST_S = 3600.0
+"""Every tick of a flight is kept in memory."""
 LAWS = ("paper", "stable", "central")
 
 
@@ -21,13 +22,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declares the arguments."""
     add_flight_arguments(parser, hand="scripted:tour?lead=1")
     parser.add_argument(
-        "--seconds", type=seconds, default=20.0, metavar="S", help="longest flight (%(default)s)"
+        "--seconds",
+        type=number(0.001, LONGEST_S),
+        default=20.0,
+        metavar="S",
+        help="longest flight (%(default)s)",
     )
     parser.add_argument(
         "--law", choices=LAWS, help="another law than the scenario's, or `central`: one computer for all"
     )
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="one row per tick, time-aligned")
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="top view (.png, .svg, .pdf)")
+    parser.add_argument("--csv", type=new_file, metavar="FILE", help="one row per tick, time-aligned")
+    parser.add_argument("--plot", type=new_file, metavar="FILE", help="top view (.png, .svg, .pdf)")
     parser.add_argument("--json", action="store_true", help="last line of stdout is the summary as JSON")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from deploy.cli.arguments import count, seconds
+from deploy.cli.arguments import count, new_file, new_folder, number, seconds, whole
 
 DESCRIPTION = """A trace is every message of a flight, byte by byte as it was sent, in MCAP files in the run
 directory. Record one with swarmtouch up --record, or join a flight with swarmtouch trace record.
@@ -71,7 +71,11 @@ _ACTIONS = {
         (
             _argument("source", nargs="?", metavar="SWARM", help=_SOURCE_HELP),
             _argument(
-                "-o", dest="output", type=Path, metavar="RUN", help="run directory (default: the flight's)"
+                "-o",
+                dest="output",
+                type=new_folder,
+                metavar="RUN",
+                help="run directory (default: the flight's)",
             ),
         ),
     ),
@@ -105,7 +109,11 @@ _ACTIONS = {
         (
             _RUN,
             _argument(
-                "--speed", type=seconds, default=1.0, metavar="X", help="2 is twice as fast (default: 1)"
+                "--speed",
+                type=number(0.001, 1000.0),
+                default=1.0,
+                metavar="X",
+                help="2 is twice as fast (default: 1)",
             ),
             _argument(
                 "--keys", nargs="+", default=(), metavar="K", help="only these keys; * is one part of a key"
@@ -129,18 +137,18 @@ _ACTIONS = {
         "runs/latest --foxglove flight.mcap --csv tables",
         (
             _RUN,
-            _argument("--foxglove", type=Path, metavar="F", help="write an MCAP file with Foxglove's schemas"),
-            _argument("--csv", type=Path, metavar="DIR", help="write CSV tables: aligned.csv and one per key"),
+            _argument("--foxglove", type=new_file, metavar="F", help="an MCAP file with Foxglove's schemas"),
+            _argument("--csv", type=new_folder, metavar="DIR", help="CSV tables: aligned.csv and one per key"),
         ),
     ),
     "path": Action(
         "follow one hand sample through the swarm: waiting, transport and compute of every hop",
         "412 runs/latest --svg path.svg",
         (
-            _argument("number", type=int, metavar="SEQ", help="number of the hand sample"),
+            _argument("number", type=whole(0, 2**64 - 1), metavar="SEQ", help="number of the hand sample"),
             _RUN,
-            _argument("--perfetto", type=Path, metavar="F", help="write JSON for ui.perfetto.dev"),
-            _argument("--svg", type=Path, metavar="F", help="write a space-time diagram"),
+            _argument("--perfetto", type=new_file, metavar="F", help="write JSON for ui.perfetto.dev"),
+            _argument("--svg", type=new_file, metavar="F", help="write a space-time diagram"),
         ),
     ),
     "report": Action(
@@ -155,7 +163,7 @@ _ACTIONS = {
                 help="run directory or MCAP file, flight folder, or ROS bag; of several, the figures show"
                 " the first, the tables all",
             ),
-            _argument("-o", dest="output", type=Path, metavar="DIR", required=True, help="where to"),
+            _argument("-o", dest="output", type=new_folder, metavar="DIR", required=True, help="where to"),
         ),
     ),
 }

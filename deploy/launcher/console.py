@@ -9,6 +9,8 @@ from rich.text import Text
 from deploy.launcher.streams import PatientStream, SteadyStream
 from shared.plain_text import plain
 
+WIDTH = 80
+"""Tables fit into so many columns; a narrower terminal folds their lines, but nothing is left out."""
 _LONGEST_LINE = 4000
 
 
@@ -32,4 +34,6 @@ def open_console(stream: PatientStream | None = None, *, stderr: bool = False) -
         stderr: Without a stream, whether on standard error instead of standard output.
     """
     target = stream or SteadyStream(sys.stderr if stderr else sys.stdout)
-    return PlainConsole(file=cast(TextIO, target), highlight=False)
+    console = PlainConsole(file=cast(TextIO, target), highlight=False)
+    console.width = max(console.width, WIDTH)
+    return console

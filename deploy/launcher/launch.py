@@ -9,7 +9,7 @@ from pathlib import Path
 from attrs import frozen
 from rich.console import Console
 
-from deploy.launcher.console import open_console
+from deploy.launcher.console import WIDTH, open_console
 from deploy.launcher.flight import Flight, Outcome
 from deploy.launcher.glove_panel import GlovePanel
 from deploy.launcher.hand_choice import HandChoice, choose_hand
@@ -152,7 +152,7 @@ async def _fly(
         console=page,
         verbose=options.verbose,
     )
-    live = options.live and console.is_terminal and in_foreground(console.file.fileno())
+    live = options.live and _is_ours(console)
     panel = GlovePanel(options.glove.patterns) if options.glove else None
     with (
         join(scenario, formation, OBSERVER) as bus,
@@ -179,6 +179,14 @@ async def _fly(
 
 def _texts(*files: Path) -> dict[Path, str]:
     return {file: file.read_text(encoding="utf-8") for file in files if file.exists()}
+
+
+def _is_ours(console: Console) -> bool:
+    """Whether it is a terminal that we may draw on, and wide enough."""
+    if not console.is_terminal:
+        return False
+    terminal = console.file.fileno()
+    return in_foreground(terminal) and os.get_terminal_size(terminal).columns >= WIDTH
 
 
 def _console_choice(hand: HandChoice, run_dir: Path) -> ConsoleChoice:

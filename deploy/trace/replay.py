@@ -3,15 +3,19 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from observer.trace.read import open_trace
+from observer.trace.read import Trace, open_trace
 from observer.trace.replay import PREFIX, replay
 from shared.bus import ZenohBus
 from shared.clock import system_clock
+from shared.errors import ConfigError
 from shared.formation import build_formation
 from shared.net.settings import peer_settings
 from shared.nodes import RELAY, endpoint
 from shared.process import prepare_process
 from shared.topics import matches
+
+_NAMED = 20
+"""Of more keys only so many are named."""
 
 
 def main(*, run: Path, speed: float, keys: Sequence[str], as_live: bool, delay: float) -> int:
@@ -22,6 +26,7 @@ def main(*, run: Path, speed: float, keys: Sequence[str], as_live: bool, delay: 
     # the past never competes with a living one.
     listen = endpoint(trace.scenario, build_formation(trace.scenario), RELAY)
     prefix = "" if as_live else PREFIX
+    _check_keys(trace, keys)
     chosen = (r for r in trace.records() if not keys or any(matches(key, r.key) for key in keys))
     with ZenohBus(peer_settings(trace.scenario.swarm.name, listen)) as bus:
         print(f"replaying {run} as {prefix}... at {listen} in {delay:g} s", flush=True)
@@ -35,3 +40,21 @@ def main(*, run: Path, speed: float, keys: Sequence[str], as_live: bool, delay: 
     for fault in trace.faults:
         print(f"{run}: {fault}")
     return 0 if done.messages else 1
+
+
+def _check_keys(trace: Trace, keys: Sequence[str]) -> None:
+    """Looks whether there is anything to say on each of some keys.
+
+    Raises:
+        ConfigError: There is not.
+    """
+    silent, said = list(keys), set[str]()
+    for record in trace.records():
+        if not silent:
+            return
+        if record.key not in said:
+            said.add(record.key)
+            silent = [key for key in silent if not matches(key, record.key)]
+    if silent:
+        known = ", ".join(sorted(said)[:_NAMED]) or "nothing"
+        raise ConfigError(f"--keys {silent[0]}: nothing was said there; the trace has {known}")

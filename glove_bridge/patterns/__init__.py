@@ -1,5 +1,6 @@
 """Tactile patterns: data files, their schema, and what is loaded from them."""
 
+import contextlib
 import difflib
 from pathlib import Path
 
@@ -43,8 +44,9 @@ def load_patterns(source: str | Path) -> PatternSet:
 
 def _find(source: str | Path) -> Path:
     for path in (Path(source), FOLDER / f"{source}.toml"):
-        if path.is_file():
-            return path
+        with contextlib.suppress(OSError):  # a name that is too long for any file
+            if path.is_file():
+                return path
     close = difflib.get_close_matches(str(source), shipped_sets(), 1)
     hint = f"did you mean {close[0]!r}?" if close else f"sets that ship: {', '.join(shipped_sets())}"
     raise ConfigError(f"{source}: no such pattern set; {hint}")

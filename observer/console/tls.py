@@ -29,14 +29,14 @@ def certificate(folder: Path, host: str) -> tuple[Path, Path]:
         ConfigError: One of the two is missing, the folder cannot be written, or there is no `cryptography`.
     """
     pair = folder / CERTIFICATE, folder / KEY
-    there = [path.is_file() for path in pair]
-    if all(there):
-        return pair
-    if any(there):
-        raise ConfigError(
-            f"--tls {folder}: expected both {CERTIFICATE} and {KEY}, or neither to have them made"
-        )
     try:
+        there = [path.is_file() for path in pair]
+        if all(there):
+            return pair
+        if any(there):
+            raise ConfigError(
+                f"--tls {folder}: expected both {CERTIFICATE} and {KEY}, or neither to have them made"
+            )
         _make(*pair, host)
     except OSError as error:
         raise ConfigError(f"--tls {folder}: cannot be written: {error}") from error

@@ -147,7 +147,10 @@ def open_trace(source: str | Path | None = None) -> Trace:
         raise ConfigError(
             f"{path}: no trace; record one with swarmtouch up --record or swarmtouch trace record"
         )
-    return Trace(files)
+    try:
+        return Trace(files)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
 
 
 def _top_level(file: Path) -> Iterator[object]:

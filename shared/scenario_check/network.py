@@ -9,7 +9,7 @@ from shared.config import vehicle_settings
 from shared.formation import Formation, Link
 from shared.messages import MAX_POSITION, MOST_LOST, DroneState, Heard, Lost, Mode, Vector
 from shared.nodes import all_nodes
-from shared.scenario import Scenario
+from shared.scenario import MAX_PORT, Scenario
 from shared.scenario_check.finding import Finding
 from shared.topics import DRONE_STATE, HAND
 
@@ -59,6 +59,12 @@ def largest_displacement(link: Link, speed: float) -> float:
 
 def _nodes(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
     known = all_nodes(formation)
+    if scenario.net.base_port + len(known) > MAX_PORT + 1:
+        yield Finding(
+            "net.base_port",
+            f"{scenario.net.base_port} leaves no ports for {len(known)} nodes",
+            f"{MAX_PORT + 1 - len(known)} is the last that does",
+        )
     for node in scenario.net.endpoints:
         if node not in known:
             yield Finding(

@@ -361,14 +361,14 @@ def test_an_endpoint_in_use_is_refused_with_a_hint() -> None:
     (port,) = free_ports(tcp=1, udp=0)[0]
     with (
         ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{port}")),
-        pytest.raises(DeviceError, match=rf"{port}.*Is the port in use\? Set net\.endpoints"),
+        pytest.raises(DeviceError, match=rf"^(?!.*\.rs).*{port}.*Is the port in use\? Set net\.endpoints"),
     ):
         ZenohBus(peer_settings("swarm", f"tcp/127.0.0.1:{port}"))
 
 
 def test_clients_outlive_their_router_and_need_one_to_begin() -> None:
     where = f"tcp/127.0.0.1:{free_ports(tcp=1, udp=0)[0][0]}"
-    with pytest.raises(DeviceError, match=r"no router.*net\.router"):
+    with pytest.raises(DeviceError, match=r"no router(?!.*\.rs).*net\.router"):
         ZenohBus(client_settings("swarm", where))
     with routing(where):
         sender, receiver = (ZenohBus(client_settings("swarm", where)) for _ in range(2))

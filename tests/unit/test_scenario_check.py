@@ -69,6 +69,7 @@ def test_the_recorded_flights_pass(flight: Path) -> None:
         ("rhombus", "fence={min=[-0.2,-0.2,0],max=[0.2,0.2,2]}", "fence"),
         ("rhombus", "hand.home=[9.0,0.0]|fence.min=[-3,-3,0]|fence.max=[3,3,3]", "hand.home"),
         ("rhombus", "fence.max=[9,9,1.3]", "limits.takeoff_height"),
+        ("rhombus", "net.base_port=65530", "net.base_port"),
         ("rhombus", "limits.takeoff_height=0.1", "limits.takeoff_height"),
         ("rhombus", "fence.min=[-9,-9,0.1]", "fence.min"),
         ("rhombus", "hand.height=5.0", "hand.height"),

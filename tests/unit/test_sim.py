@@ -57,7 +57,7 @@ def test_a_flight_of_no_length_is_refused(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit) as end:
         main(["sim", "rhombus", "--seconds", "-1"])
     assert end.value.code == 2
-    assert "must be more than 0" in capsys.readouterr().err
+    assert "must be 0.001 to 3,600" in capsys.readouterr().err
 
 
 def millimetres(folder: Path) -> str:

@@ -103,3 +103,13 @@ def test_impossible_numbers_are_refused(arguments: list[str], capsys: pytest.Cap
     with pytest.raises(SystemExit):
         main(["trace", *arguments])
     assert arguments[-2] in capsys.readouterr().err
+
+
+def test_a_replay_of_keys_on_which_nothing_was_said_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path, flight(30))
+    assert main(["trace", "replay", str(tmp_path), "--keys", "human/*", "drone/9/state"]) == 2
+    line = capsys.readouterr().err
+    assert "--keys drone/9/state: nothing was said there" in line
+    assert "the trace has drone/1/state, drone/2/state, human/hand" in line
