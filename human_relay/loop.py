@@ -51,6 +51,8 @@ def run(
     state = RelayState(epoch=clock(), period_ns=round(NS_PER_S / hand_hz))
     ordered: list[Wish] = []
     rejected, complain_ns = 0, 0
+    for remark in source.remarks:
+        _log.warning("%s", remark)
 
     def report(word: str, *, force: bool = False) -> None:
         metrics = {"samples": float(state.seq)}

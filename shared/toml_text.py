@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from shared.errors import ConfigError
+from shared.text_file import read_text
 
 
 def read_toml(path: Path, hint: str = "") -> dict[str, Any]:
@@ -18,8 +19,8 @@ def read_toml(path: Path, hint: str = "") -> dict[str, Any]:
         ConfigError: It cannot be read or is not TOML.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
+        text = read_text(path)
+    except ValueError as error:
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}{hint and f'; {hint}'}") from error

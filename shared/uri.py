@@ -1,12 +1,23 @@
-"""URIs by which backends are chosen: `scheme:path?key=value&...`."""
+"""URIs by which backends are chosen: `scheme:path?key=value&...`, or `scheme://path?...`.
+
+A path is what the user would type at a prompt, with `#`, `%`, `[` and blanks in it; only what follows its last
+`?` is taken for options, where it looks like some. `%20` and its like stand for their characters, but `%25`
+does not: a percent sign is one. A file that is there under the literal name goes before.
+"""
 
 import math
+import re
 from collections.abc import Mapping
-from urllib.parse import parse_qsl, unquote, urlsplit
+from pathlib import Path
+from urllib.parse import unquote
 
 from attrs import field, frozen
 
 from shared.errors import ConfigError
+
+_SCHEME = re.compile(r"([a-z][a-z0-9+.-]*):(?://)?", re.IGNORECASE)
+_OPTIONS = re.compile(r"[a-z_]+=[^&]*(?:&[a-z_]+=[^&]*)*")
+_WORDS = re.compile(r"[a-z_&=]*")
 
 
 @frozen(kw_only=True)
@@ -16,13 +27,13 @@ class Uri:
     Attributes:
         text: As the user gave it.
         scheme: Names the backend.
-        path: What follows the scheme (and `//`), percent-decoded.
-        options: The query.
+        literal: What follows the scheme (and `//`), as it is.
+        options: What follows the last `?`, as it is.
     """
 
     text: str
     scheme: str
-    path: str
+    literal: str
     options: Mapping[str, str] = field(factory=dict)
 
     def refuse_unknown(self, *known: str) -> None:
@@ -49,6 +60,30 @@ class Uri:
             raise ConfigError(f"{self.text}: {name}={text} must be a number from {low:g} to {high:g}")
         return value
 
+    @property
+    def path(self) -> str:
+        """What follows the scheme (and `//`), percent-decoded but for `%25`."""
+        return unquote(self.literal.replace("%25", "%2525"))
+
+    def file(self, example: str) -> Path:
+        """Returns the file or folder that the path names, be it there or not.
+
+        Args:
+            example: A good URI, for the message.
+
+        Raises:
+            ConfigError: There is no path.
+        """
+        if not self.path or "\0" in self.path:
+            raise ConfigError(f"{self.text}: no path; for example {example}")
+        return file_path(self.literal)
+
+
+def file_path(text: str) -> Path:
+    """Returns the file of a name, or of the percent-decoded name if only that is there."""
+    path, decoded = (Path(name).expanduser() for name in (text, unquote(text)))
+    return decoded if not path.exists() and decoded.exists() else path
+
 
 def parse_uri(text: str, *, example: str) -> Uri:
     """Splits a URI.
@@ -60,12 +95,16 @@ def parse_uri(text: str, *, example: str) -> Uri:
     Raises:
         ConfigError: It has no scheme, or an option without a value.
     """
-    try:
-        parts = urlsplit(text)
-        options = dict(parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query)))
-    except ValueError as error:
-        raise ConfigError(f"{text}: not a URI: {error}; for example {example}") from error
-    if not parts.scheme:
+    found = _SCHEME.match(text)
+    if not found:
         raise ConfigError(f"{text}: no scheme; for example {example}")
-    path = unquote(parts.netloc + parts.path)
-    return Uri(text=text, scheme=parts.scheme, path=path, options=options)
+    rest = text[found.end() :]
+    path, mark, tail = rest.rpartition("?")
+    if mark and _OPTIONS.fullmatch(tail):
+        pairs = (pair.partition("=") for pair in tail.split("&"))
+        options = {name: value for name, _, value in pairs}
+    elif mark and _WORDS.fullmatch(tail):
+        raise ConfigError(f"{text}: not a URI: options are key=value; for example {example}")
+    else:
+        path, options = rest, {}
+    return Uri(text=text, scheme=found[1].lower(), literal=path, options=options)

@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     for name, value in summary.items():
         shown = f"{value:.3f}" if isinstance(value, float) else value
-        if name == "faults":
+        if isinstance(value, list):
             shown = "; ".join(value) or "none"
         print(f"{name:20} {shown}", file=sys.stderr if arguments.json else sys.stdout)
     if arguments.json:

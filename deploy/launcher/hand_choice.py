@@ -1,6 +1,7 @@
 """How the relay of a flight gets its hand: from the source that the user names, from a pointer, or both."""
 
 import os
+from contextlib import closing
 from pathlib import Path
 from urllib.parse import quote, urlencode
 
@@ -25,11 +26,13 @@ class HandChoice:
         uri: Hand source of the relay.
         takeover: Pointer that may take it over, None for none.
         pointer: Socket of the pointer, empty without one.
+        remarks: What is to be known about it: what was left out of a recording, and why.
     """
 
     uri: str
     takeover: str | None = None
     pointer: str = ""
+    remarks: tuple[str, ...] = ()
 
 
 def choose_hand(uri: str, scenario: Scenario, *, console: bool) -> HandChoice:
@@ -54,10 +57,10 @@ def choose_hand(uri: str, scenario: Scenario, *, console: bool) -> HandChoice:
         own = _own_socket()
         takeover = _pointer_uri(own, {"speed": f"{_speed(scenario):g}"})
         choice = evolve(choice, takeover=takeover, pointer=str(own))
-    for source in (choice.uri, choice.takeover):
-        if source:
-            open_source(source, start_ns=0).close()
-    return choice
+    if choice.takeover:
+        open_source(choice.takeover, start_ns=0).close()
+    with closing(open_source(choice.uri, start_ns=0)) as source:
+        return evolve(choice, remarks=source.remarks)
 
 
 def _own_socket() -> Path:
@@ -66,7 +69,8 @@ def _own_socket() -> Path:
 
 
 def _pointer_uri(socket: Path, options: dict[str, str]) -> str:
-    return f"{POINTER}://{quote(str(socket))}?{urlencode(options)}"
+    # A percent sign is one (`shared.uri`).
+    return f"{POINTER}://{quote(str(socket), safe='/%')}?{urlencode(options)}"
 
 
 def _speed(scenario: Scenario) -> float:

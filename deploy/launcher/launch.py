@@ -158,6 +158,8 @@ async def _fly(
         join(scenario, formation, OBSERVER) as bus,
         StatusView(console, run_dir, live=live, panel=panel) as view,
     ):
+        for remark in hand.remarks:
+            view.event(f"hand: {remark}")
         if page:
             view.event(f"fly it in the browser: {_page_address(page.port)}")
         if form().refused:
@@ -174,7 +176,7 @@ async def _fly(
             view=view,
         )
         outcome = await flight.run()
-    return outcome, flight_summary(outcome, monitor, glove=options.glove)
+    return outcome, flight_summary(outcome, monitor, glove=options.glove, remarks=hand.remarks)
 
 
 def _texts(*files: Path) -> dict[Path, str]:

@@ -1,6 +1,6 @@
 """What is left of a flight: the JSON contract of `swarmtouch up` and the printed tables."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -21,13 +21,16 @@ Json = dict[str, Any]
 _OUTCOMES = ("played", "delivered", "suppressed", "failed", "lost")
 
 
-def flight_summary(outcome: Outcome, monitor: Monitor, glove: GloveChoice | None = None) -> Json:
+def flight_summary(
+    outcome: Outcome, monitor: Monitor, glove: GloveChoice | None = None, remarks: Sequence[str] = ()
+) -> Json:
     """Puts the numbers of a flight together.
 
     Args:
         outcome: How the flight went.
         monitor: What was heard of it.
         glove: What the operator wore.
+        remarks: What was left out of a recorded hand, and why.
 
     Returns:
         The JSON contract: `ok` (no `faults`: no unexpected exit, every drone followed if the hand ever asked
@@ -35,15 +38,15 @@ def flight_summary(outcome: Outcome, monitor: Monitor, glove: GloveChoice | None
         `min_distance_m`, `min_hand_distance_m`, `collisions`, `fence_exits` (null without a simulated world),
         `agents` with `id, steps, rate_hz, on_time, hand_used, tracking_rms_m, latency_ms {p50, p99}, cpu,
         rss_mb` each; and beyond the contract `faults` (sentences), `hand` (`asked`: whether it ever asked to
-        fly; `rejected`: how many of its poses were impossible), `landed`, `formation`, `glove` (null without
-        one: `uri`, `patterns`; `played`, `delivered`, `suppressed`, `failed` and `lost` by pattern;
-        `latency_ms` from the drone state to the first frame) and, per agent, `followed`, `lateness_ms`,
-        `missed`, `rejected` (by reason) and `restarts`.
+        fly; `rejected`: how many of its poses were impossible; `remarks`), `landed`, `formation`, `glove`
+        (null without one: `uri`, `patterns`; `played`, `delivered`, `suppressed`, `failed` and `lost` by
+        pattern; `latency_ms` from the drone state to the first frame) and, per agent, `followed`,
+        `lateness_ms`, `missed`, `rejected` (by reason) and `restarts`.
     """
     referee = outcome.referee
     formation = attrs.asdict(monitor.stats.formation())
     agents = [_agent(agent, outcome, monitor) for agent in monitor.stats.agents()]
-    hand = {"asked": monitor.asked, "rejected": monitor.rejected_poses}
+    hand = {"asked": monitor.asked, "rejected": monitor.rejected_poses, "remarks": list(remarks)}
     faults = _faults(outcome, {agent["id"]: agent["followed"] for agent in agents}, hand)
     return {
         "ok": not faults,
@@ -70,6 +73,8 @@ def print_summary(summary: Json, console: Console) -> None:
     if summary["glove"]:
         console.print(_glove_table(summary["glove"]))
     console.print(_flight_table(summary))
+    for remark in summary["hand"]["remarks"]:
+        console.print(f"hand: {remark}", soft_wrap=True)
     for fault in summary["faults"]:
         console.print(f"not ok: {fault}", soft_wrap=True)
 

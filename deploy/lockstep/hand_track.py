@@ -6,15 +6,18 @@ from contextlib import closing
 
 import numpy as np
 from attrs import field, frozen
+from msgspec.structs import replace
 
 from agents.agent import hand_input
 from agents.control.hand import HandInput, HandSettings, MappedHand, map_hand
 from deploy.lockstep.ticks import tick_ns
-from human_relay.relay import RelayState, make_sample
+from human_relay.relay import RelayState, due_ns, make_sample
 from human_relay.sources import open_source
 from shared.arrays import Vec
 from shared.clock import NS_PER_S
+from shared.errors import ConfigError
 from shared.messages import HandSample
+from shared.topics import HAND
 
 
 @frozen(kw_only=True)
@@ -40,26 +43,36 @@ class HandTrack:
     yaw_rate: Vec = field(eq=False)
 
 
-def relayed(uri: str, seconds: float, rate_hz: float) -> list[HandSample]:
-    """Plays a hand source through the relay's core, one sample per tick.
+def relayed(uri: str, seconds: float, rate_hz: float, hand_hz: float = HAND.rate_hz) -> list[HandSample]:
+    """Plays a hand source through the relay's core: what agents hear newest at each tick.
+
+    The relay takes poses at their time and sends them at its own rate; it does so here, on the virtual clock.
 
     Args:
         uri: Hand source, for example `scripted:tour`.
         seconds: Longest play, s; a source that ends earlier ends it.
         rate_hz: Ticks per second.
+        hand_hz: Samples that the relay sends per second.
 
     Raises:
-        ConfigError: The source is unknown, missing or wrong.
+        ConfigError: The source is unknown, missing or wrong, or over at once.
     """
-    samples, state = [], RelayState(epoch=0)
+    state, at = RelayState(epoch=0, period_ns=round(NS_PER_S / hand_hz)), 0
+    samples = list[HandSample]()
     with closing(open_source(uri, 0)) as source:
+        state, newest = make_sample(state, source.poll(0), 0)
         for tick in itertools.count():
             now = tick_ns(tick, rate_hz)
-            pose = source.poll(now)
+            while at <= now:
+                offered = source.poll(at)
+                if at >= due_ns(state, offered):
+                    state, newest = make_sample(state, offered, at)
+                at = max(at + 1, min(source.next_ns(at), due_ns(state, offered)))
             if source.finished or now > seconds * NS_PER_S:
                 break
-            state, sample = make_sample(state, pose, now)
-            samples.append(sample)
+            samples.append(replace(newest, seq=tick, stamp_ns=now))
+    if not samples:
+        raise ConfigError(f"{uri}: the hand is over before it has begun; there is nothing to fly")
     return samples
 
 

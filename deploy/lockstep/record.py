@@ -13,6 +13,7 @@ from agents.vehicles.world.referee import RefereeState, Rules, report, update
 from deploy.lockstep.hand_track import HandTrack
 from shared.arrays import Vec
 from shared.formation import Formation
+from shared.spreadsheet import cell, short
 
 
 class Moment(NamedTuple):
@@ -104,5 +105,5 @@ def write_csv(record: Record, path: Path) -> None:
     table = np.column_stack([record.hand.t, *groups.values()])
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(header)
-        writer.writerows([f"{value:.9g}" for value in row] for row in table.tolist())
+        writer.writerow(map(cell, header))
+        writer.writerows(map(short, row) for row in table.tolist())

@@ -15,7 +15,7 @@ from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.picture import draw
 from deploy.lockstep.record import Record, judge, tracking_rms, write_csv
 from deploy.verdict import absences, contacts
-from human_relay.sources import plays_by_itself, source_hints
+from human_relay.sources import plays_by_itself, source_hints, source_remarks
 from shared.compiled import form
 from shared.errors import ConfigError
 from shared.messages import HandSample, Wish
@@ -55,7 +55,7 @@ def simulate(options: Options) -> dict[str, Any]:
     Returns:
         The summary: ok, faults (sentences), drones, followed (how many ever did), asked (whether the hand ever
         wished that they fly), without_hand (samples without a possible pose), seconds, realtime_factor, the
-        referee's distances and counts, tracking_rms_m.
+        referee's distances and counts, tracking_rms_m, remarks (what was left out of the hand, and why).
 
     Raises:
         ConfigError: The scenario or the hand is refused, or a plot cannot be made.
@@ -65,7 +65,8 @@ def simulate(options: Options) -> dict[str, Any]:
     law = [f"swarm.law={options.law}"] if options.law not in (None, CENTRAL) else []
     hints = hint_overrides(source_hints(options.hand))
     scenario, formation = open_scenario(options.scenario, (*hints, *law, *options.overrides), network=False)
-    samples = relayed(options.hand, options.seconds, scenario.rates.control_hz)
+    rates = scenario.rates
+    samples = relayed(options.hand, options.seconds, rates.control_hz, rates.hand_hz)
     started = time.perf_counter()
     fly = fly_central if options.law == CENTRAL else fly_lockstep
     record = fly(scenario, formation, samples)
@@ -74,7 +75,7 @@ def simulate(options: Options) -> dict[str, Any]:
         write_csv(record, options.csv)
     if options.plot:
         draw(record, scenario, options.plot)
-    return _summary(record, scenario, samples, took_s)
+    return {**_summary(record, scenario, samples, took_s), "remarks": list(source_remarks(options.hand))}
 
 
 def _summary(

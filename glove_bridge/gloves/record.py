@@ -32,8 +32,8 @@ class RecordGlove(TimedGlove):
         super().__init__()
         uri.refuse_unknown()
         path = uri.path
-        if not path:
-            raise ConfigError("record://: no file; for example record://patterns.jsonl")
+        if not path or "\0" in path:
+            raise ConfigError(f"{uri.text}: no file; for example record://patterns.jsonl")
         try:
             # Unbuffered: every frame is in the file when it starts, and closing cannot fail.
             self._file: io.FileIO | None = io.FileIO(path, "ab")

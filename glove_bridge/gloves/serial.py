@@ -17,7 +17,7 @@ from glove_bridge.patterns.pattern import Pattern
 from glove_bridge.session import Session
 from shared.clock import NS_PER_S
 from shared.errors import ConfigError
-from shared.uri import Uri
+from shared.uri import Uri, file_path
 
 _RATES = (9600, 19200, 38400, 57600, 115200)
 _LINKS = {"usb": USB, "xbee": XBEE}
@@ -50,7 +50,8 @@ class SerialGlove:
         uri.refuse_unknown("baud", "link", "calibration")
         if not uri.path:
             raise ConfigError(f"{uri.text}: no device; for example serial:///dev/ttyACM0")
-        self._calibration = load_calibration(uri.options.get("calibration"))
+        calibration = uri.options.get("calibration")
+        self._calibration = load_calibration(file_path(calibration) if calibration else None)
         self.link = SerialLink(uri.path, link_timing(uri))
         # Every pattern ends exactly once, in the order of the wishes: counting tells whom a report is about.
         self._asked = self._ended = self._given_up = 0

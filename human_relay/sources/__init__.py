@@ -1,6 +1,7 @@
 """Hand sources by URI: one row per backend, imported only when it is used."""
 
 import importlib
+from contextlib import closing
 from typing import cast
 
 from human_relay.sources.base import HandBackend, HandSource
@@ -45,6 +46,12 @@ def source_hints(uri: str) -> dict[str, object]:
     """
     parsed = parse_uri(uri, example=_EXAMPLE)
     return _backend(parsed).hints(parsed)
+
+
+def source_remarks(uri: str) -> tuple[str, ...]:
+    """Returns what is to be known about a source before it flies; errors as for `open_source`."""
+    with closing(open_source(uri, 0)) as source:
+        return source.remarks
 
 
 def plays_by_itself(uri: str) -> bool:

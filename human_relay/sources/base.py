@@ -43,6 +43,11 @@ class HandSource(Protocol):
         ...
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the operator is to know before it flies: what was left out of a recording, and why."""
+        ...
+
+    @property
     def finished(self) -> bool:
         """Whether a recording or a bounded script has ended; stays true."""
         ...

@@ -32,6 +32,8 @@ _log = logging.getLogger("pointer")
 class PointerHand:
     """The `pointer:` backend."""
 
+    remarks: tuple[str, ...] = ()
+
     def __init__(self, uri: Uri, start_ns: int) -> None:
         """Listens at once.
 

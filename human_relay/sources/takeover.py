@@ -49,6 +49,11 @@ class Takeover:
         return pointer_ns if self._taken else min(pointer_ns, self._first.next_ns(now_ns))
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is to be known about the source that plays."""
+        return self._first.remarks
+
+    @property
     def finished(self) -> bool:
         """Whether the first source has ended and nobody has taken over."""
         return self._ended

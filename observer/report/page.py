@@ -69,6 +69,7 @@ def page(flights: Sequence[FlightRecord], rows: Mapping[str, FleetRow], shown: S
             '<meta name="viewport" content="width=device-width">',
             f"<title>{title}</title><style>{_LOOK}</style></head><body>",
             f"<h1>{title}</h1><p>{about}.</p>",
+            *(f'<p class="absent">{escape(remark)}</p>' for remark in first.remarks),
             "<h2>Fleet</h2>",
             fleet_table(rows),
             f"<p>{_FLEET}</p>",

@@ -6,12 +6,16 @@ from typing import NamedTuple
 import numpy as np
 from attrs import frozen
 
+from shared.clock import NS_PER_S
 from shared.formation import Formation
+from shared.recordings.check import gap_ns
 from shared.recordings.track import Vec
 from shared.scenario import Hand, Obstacle
 
 ROW_HZ = 60.0
 """Rows per second of a record."""
+STALE_S = 0.5
+"""Nobody holds a set-point for longer: then its recording has a gap."""
 
 
 class Played(NamedTuple):
@@ -25,6 +29,8 @@ class Played(NamedTuple):
 @frozen(kw_only=True, eq=False)
 class FlightRecord:
     """A flight of N drones in T rows at 60 Hz, from the first to the last moment at which all of them flew.
+
+    Where somebody was not recorded for longer than a few frames, nothing is a number: gaps stay gaps.
 
     Attributes:
         name: What to call it.
@@ -43,6 +49,7 @@ class FlightRecord:
         obstacles: Columns.
         safety_radius: Of the zone around a column's centre in which avoidance acts, m.
         patterns: What the operator felt.
+        remarks: What was left out, and why, in words.
         mapping_known: Whether it is known how the hand was mapped; if not, `mapped` is the hand itself.
     """
 
@@ -62,6 +69,7 @@ class FlightRecord:
     obstacles: tuple[Obstacle, ...]
     safety_radius: float
     patterns: tuple[Played, ...] = ()
+    remarks: tuple[str, ...] = ()
     mapping_known: bool = True
 
     @property
@@ -96,20 +104,36 @@ def mapped_hand(position: Vec, hand: Hand) -> Vec:
 
 
 def resample(t: Vec, at: Vec, values: Vec) -> Vec:
-    """Interpolates linearly; gaps are bridged straight, ends are held.
+    """Interpolates linearly; where nothing was recorded for longer than a gap, there is nothing.
 
     Args:
         t: (T,) wanted times.
-        at: (n,) times of the values, increasing.
+        at: (n,) times of the values, increasing, s.
         values: (n, k).
 
     Returns:
-        (T, k).
+        (T, k), not a number in gaps and where the values have not begun or have ended.
     """
-    return np.column_stack([np.interp(t, at, column) for column in values.T])
+    found = np.column_stack([np.interp(t, at, column) for column in values.T])
+    longest = gap_ns(np.rint(at * NS_PER_S).astype(np.int64)) / NS_PER_S
+    after = np.searchsorted(at, t)
+    begins, ends = np.append(-np.inf, at)[after], np.append(at, np.inf)[after]
+    near = (t - begins <= longest) | (ends - t <= longest)
+    bridged = (ends - begins <= longest) | (ends == t) | (near & ~np.isfinite(ends - begins))
+    return np.where(bridged[:, None], found, np.nan)
 
 
 def hold(t: Vec, at: Vec, values: Vec) -> Vec:
-    """Returns the last of `values` (n, k) at or before each wanted time (the first one before it), (T, k)."""
-    held: Vec = values[np.maximum(np.searchsorted(at, t, side="right") - 1, 0)]
-    return held
+    """Returns the last of `values` (n, k) at each wanted time, (T, k); not a number if that is old.
+
+    The first one counts a while before it was said: a recorder starts in the middle of things.
+    """
+    row = np.maximum(np.searchsorted(at, t, side="right") - 1, 0)
+    return np.where((np.abs(t - at[row]) <= STALE_S)[:, None], values[row], np.nan)
+
+
+def runs(values: Vec) -> list[slice]:
+    """Returns the stretches of rows (T, k) without a gap, in order."""
+    there = ~np.isnan(values).any(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
+    return [slice(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]

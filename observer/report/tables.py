@@ -3,15 +3,17 @@
 The fleet table is the paper's (section "Fleet performance"): centroid of the bodies in 3-D, differentiated by
 the rows' times at the recorder; after each derivative a causal Butterworth filter (order 5, 4 Hz); the mean of
 the norms. The deviation of the area is that of the polygon of the drones from the undisturbed formation's.
+
+Rows in which a drone is missing do not count, and nothing is derived, filtered or measured across them.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 from attrs import frozen
-from scipy.signal import butter, lfilter
+from scipy.signal import butter, lfilter, lfilter_zi
 
-from observer.report.record import ROW_HZ, FlightRecord
+from observer.report.record import ROW_HZ, FlightRecord, runs
 from shared.geometry import hull_area
 from shared.recordings.track import Vec
 
@@ -70,37 +72,44 @@ class Reaction:
 def fleet_row(record: FlightRecord) -> FleetRow:
     """Returns the row of one flight; it has to be longer than `LANDING_ROWS`."""
     centroid = record.position.mean(axis=1)
-    speeds = [float(np.linalg.norm(rate, axis=1).mean()) for rate in _derivatives(record.recorded_t, centroid)]
+    rates = _derivatives(record.recorded_t, centroid)
+    speeds = [float(np.nanmean(np.linalg.norm(rate, axis=1))) for rate in rates]
     deviation = np.abs(areas(record) - record.default_area)[:-LANDING_ROWS]
     return FleetRow(
-        path=float(np.linalg.norm(np.diff(centroid, axis=0), axis=1).sum()),
+        path=float(np.nansum(np.linalg.norm(np.diff(centroid, axis=0), axis=1))),
         velocity=speeds[0],
         acceleration=speeds[1],
         jerk=speeds[2],
-        area_mean=float(deviation.mean()),
-        area_std=float(deviation.std()),
-        area_max=float(deviation.max()),
+        area_mean=float(np.nanmean(deviation)),
+        area_std=float(np.nanstd(deviation)),
+        area_max=float(np.nanmax(deviation)),
     )
 
 
 def areas(record: FlightRecord) -> Vec:
-    """Returns the area of the drones' convex hull per row, (T,), m^2."""
-    return np.array([hull_area(map(tuple, row)) for row in record.position[:, :, :2].tolist()])
+    """Returns the area of the drones' convex hull per row, (T,), m^2; not a number where a drone is missing."""
+    places = record.position[:, :, :2]
+    area = np.full(len(places), np.nan)
+    there = np.flatnonzero(np.isfinite(places).all(axis=(1, 2)))
+    area[there] = [hull_area(map(tuple, row)) for row in places[there].tolist()]
+    return area
 
 
 def reactions(records: Sequence[FlightRecord]) -> tuple[Reaction, ...]:
     """Judges the reactions to the patterns that advise a motion (CR, CL, ER, EL), of all flights together.
 
-    A pattern near the end of a flight is judged by where the flight ended.
+    A pattern near the end of a flight is judged by where the flight ended. Where the formation is not known
+    at the pattern or after it, the reaction is not judged.
 
     Returns:
         One entry per reaction time; none if no such pattern was played.
     """
     outcomes = [_outcomes(record) for record in records]
-    counted = np.concatenate(outcomes) if outcomes else np.empty((0, len(REACTION_TIMES), 2))
-    if not len(counted):
+    judged = np.concatenate(outcomes) if outcomes else np.empty((0, len(REACTION_TIMES), 2))
+    if not len(judged):
         return ()
-    means = counted.mean(axis=0)
+    counts = np.isfinite(judged).sum(axis=0)
+    means = np.where(counts, np.nansum(judged, axis=0) / np.maximum(counts, 1), np.nan)
     return tuple(
         Reaction(after=after, displacement=float(side), area=float(area))
         for after, (side, area) in zip(REACTION_TIMES, means, strict=True)
@@ -123,8 +132,10 @@ def _outcomes(record: FlightRecord) -> Vec:
     moved = _change(record.recorded_t, side, begins) * [[_SIDE[p.name[1]]] for p in advice]
     grown = _change(record.recorded_t, areas(record), begins) * [[_AREA[p.name[0]]] for p in advice]
     bound = DECIDED * record.default_area
+    by_side = np.where(moved > 0.0, 1.0, 0.0)
     by_area = np.where(grown > bound, 1.0, np.where(grown < -bound, 0.0, 0.5))
-    return np.stack([(moved > 0.0).astype(float), by_area], axis=2)
+    judged = np.stack([by_side, by_area], axis=2)
+    return np.where(np.isfinite(np.stack([moved, grown], axis=2)), judged, np.nan)
 
 
 def _change(t: Vec, values: Vec, begins: Vec) -> Vec:
@@ -141,10 +152,21 @@ def _nearest(t: Vec, wanted: Vec) -> np.ndarray[tuple[int, ...], np.dtype[np.int
 
 def _derivatives(t: Vec, centroid: Vec) -> list[Vec]:
     """Returns velocity, acceleration and jerk, each filtered."""
-    numerator, denominator = butter(ORDER, CUTOFF_HZ, fs=ROW_HZ)
     step = np.diff(t)[SETTLING_ROWS:, None]
+    step = np.where(step > 0.0, step, np.nan)
     value, rates = centroid[SETTLING_ROWS:], list[Vec]()
     for _ in range(3):
-        value = lfilter(numerator, denominator, np.diff(value, axis=0) / step[: len(value) - 1], axis=0)
+        value = _low_passed(np.diff(value, axis=0) / step[: len(value) - 1])
         rates.append(value)
     return rates
+
+
+def _low_passed(values: Vec) -> Vec:
+    """Filters each stretch without a gap: the first from rest, as the paper did, others from their begin."""
+    numerator, denominator = butter(ORDER, CUTOFF_HZ, fs=ROW_HZ)
+    steady = lfilter_zi(numerator, denominator)[:, None]
+    passed = np.full_like(values, np.nan)
+    for run in runs(values):
+        state = steady * (values[run.start] if run.start else 0.0 * values[0])
+        passed[run], _ = lfilter(numerator, denominator, values[run], axis=0, zi=state)
+    return passed

@@ -12,6 +12,7 @@ from observer.report.figures import FIGURES, Columns, Drawing, style
 from observer.report.page import Shown, page
 from observer.report.record import FlightRecord
 from observer.report.tables import FleetRow, fleet_row
+from shared.spreadsheet import cell, short
 
 PAGE = "report.html"
 FLEET = "fleet.csv"
@@ -61,6 +62,5 @@ def _write_figure(drawing: Drawing, flights: Sequence[FlightRecord], folder: Pat
 def _write_csv(path: Path, columns: Columns) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(columns)
-        for row in zip(*columns.values(), strict=True):
-            writer.writerow([value if isinstance(value, str) else f"{value:.9g}" for value in row])
+        writer.writerow(map(cell, columns))
+        writer.writerows(map(short, row) for row in zip(*columns.values(), strict=True))

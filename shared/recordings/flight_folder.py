@@ -6,6 +6,7 @@ nanoseconds since the epoch, quaternions x, y, z, w, world frame z up.
 """
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,12 +14,18 @@ import numpy as np
 from attrs import frozen
 
 from shared.errors import ConfigError
-from shared.recordings.csv_table import LARGEST, read_rows, read_table
-from shared.recordings.track import Stamps, Track, Vec
+from shared.recordings.check import ROOM, Checked, check
+from shared.recordings.csv_table import read_header, read_table
+from shared.recordings.track import NO_STAMP, Found, Stamps, Track, Vec
 from shared.scenario import Obstacle, Pair
+from shared.text_file import read_text
 
 HAND_FILE = "glove.csv.gz"
 PATTERN_FILE = "pattern_topic.csv.gz"
+LARGEST = 1_000.0
+"""Size of the largest number in `meta.json`, m."""
+MOST_NAMED = 100_000
+"""Lines of the files that hold names."""
 
 
 class Setpoints(NamedTuple):
@@ -58,59 +65,77 @@ class Meta:
     high: Pair
 
 
-def read_track(path: Path) -> Track:
-    """Reads `glove.csv.gz` or `cf<i>.csv.gz`.
+def read_body(path: Path) -> Checked:
+    """Reads `glove.csv.gz` or `cf<i>.csv.gz` and checks it.
 
     Raises:
-        ConfigError: Names the file and the row.
+        ConfigError: Names the file and the line.
     """
-    stamps, numbers = read_table(path, integers=("t_ns",), numbers=("x", "y", "z", "qx", "qy", "qz", "qw"))
-    return Track(check_increasing(path, stamps[:, 0]), numbers[:, :3], numbers[:, 3:])
+    return _read(path, ("qx", "qy", "qz", "qw"))
+
+
+def read_track(path: Path) -> Track:
+    """Reads what is left of `glove.csv.gz` or `cf<i>.csv.gz`; errors as for `read_body`."""
+    return read_body(path).track
 
 
 def read_setpoints(path: Path) -> Setpoints:
     """Reads `cf<i>_sp.csv.gz`.
 
     Raises:
-        ConfigError: Names the file and the row.
+        ConfigError: Names the file and the line.
     """
-    stamps, numbers = read_table(path, integers=("t_ns",), numbers=("x", "y", "z"))
-    return Setpoints(check_increasing(path, stamps[:, 0]), numbers)
+    track = _read(path, ()).track
+    return Setpoints(track.t_ns, track.position)
 
 
-def read_arrivals(path: Path) -> Stamps:
-    """Reads when each row of `cf<i>.csv.gz` or `glove.csv.gz` arrived at the recorder, (n,) ns.
-
-    Raises:
-        ConfigError: Names the file and the row.
-    """
-    return read_table(path, integers=("t_bag_ns",))[0][:, 0]
+def _read(path: Path, turns: Sequence[str]) -> Checked:
+    """Reads a table of places, by its stamps and, where it has them, its arrivals."""
+    times = ("t_ns", *(("t_bag_ns",) if "t_bag_ns" in read_header(path) else ()))
+    table = read_table(path, integers=times, numbers=("x", "y", "z", *turns))
+    stamps = table.stamps[:, 0]
+    return check(
+        Found(
+            t_ns=np.where(stamps == 0, NO_STAMP, stamps),
+            position=table.numbers[:, :3],
+            quaternion=table.numbers[:, 3:] if turns else None,
+            arrival_ns=table.stamps[:, 1] if len(times) > 1 else None,
+            lines=table.lines,
+            remarks=table.remarks,
+        ),
+        str(path),
+    )
 
 
 def read_patterns(folder: Path) -> tuple[tuple[int, str], ...]:
     """Reads the patterns that the operator felt: arrival at the recorder (ns) and name; none if felt nothing.
 
     Raises:
-        ConfigError: Names the file and the row.
+        ConfigError: Names the file and the line.
     """
     path = folder / PATTERN_FILE
     if not path.is_file():
         return ()
-    stamps, _ = read_table(path, integers=("t_bag_ns",))
+    table = read_table(path, integers=("t_bag_ns",), texts=("name",), most=MOST_NAMED)
     # A row without a name is a tick of the original loop at which nothing was played.
-    return tuple((t, name) for t, name in zip(stamps[:, 0].tolist(), _names(path), strict=True) if name)
+    return tuple((t, name) for t, [name] in zip(table.stamps[:, 0].tolist(), table.texts, strict=True) if name)
 
 
 def read_obstacles(folder: Path) -> tuple[Obstacle, ...]:
     """Reads the columns of a flight at their median places, in the order in which the law handled them.
 
     Raises:
-        ConfigError: Names the file and the row.
+        ConfigError: Names the file and the line.
     """
     path = folder / "obstacles.csv"
-    _, places = read_table(path, numbers=("median_x", "median_y"))
+    table = read_table(path, numbers=("median_x", "median_y"), texts=("name",), most=MOST_NAMED)
+    near = np.abs(table.numbers).max(axis=1) <= ROOM
+    if not near.all():
+        line = int(table.lines[np.flatnonzero(~near)[0]])
+        raise ConfigError(f"{path}: line {line}: no place within {ROOM:g} m; expected metres")
     return tuple(
-        Obstacle(name=name, x=x, y=y) for name, (x, y) in zip(_names(path), places.tolist(), strict=True)
+        Obstacle(name=name, x=x, y=y)
+        for [name], (x, y) in zip(table.texts, table.numbers.tolist(), strict=True)
     )
 
 
@@ -122,7 +147,7 @@ def read_meta(folder: Path) -> Meta:
     """
     path = folder / "meta.json"
     try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
+        tree = json.loads(read_text(path))
     except (OSError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path.absolute()}: cannot be read as JSON: {error}") from error
     if not isinstance(tree, dict):
@@ -143,35 +168,11 @@ def read_meta(folder: Path) -> Meta:
     )
 
 
-def check_increasing(path: Path, t: Stamps) -> Stamps:
-    """Returns the stamps if each is later than the one before.
-
-    Raises:
-        ConfigError: Names the file and the first row that is not.
-    """
-    late = np.flatnonzero(np.diff(t) <= 0)
-    if late.size:
-        raise ConfigError(f"{path}: row {int(late[0]) + 3}: the time does not increase; rows must be in order")
-    return t
-
-
-def _names(path: Path) -> list[str]:
-    """Reads the column `name`."""
-    header, *rows = read_rows(path)
-    if "name" not in header:
-        raise ConfigError(f"{path}: no column name, found the header {','.join(header)}")
-    column = header.index("name")
-    for line, row in enumerate(rows, start=2):
-        if len(row) <= column:
-            raise ConfigError(f"{path}: row {line}: no name")
-    return [row[column] for row in rows]
-
-
 def _numbers(path: Path, tree: dict[str, object], key: str, count: int) -> list[float]:
     value = tree.get(key)
     values = value if isinstance(value, list) else [value]
     numbers = [float(v) for v in values if isinstance(v, int | float) and abs(v) <= LARGEST]
     if not len(numbers) == len(values) == count:
         expected = "a number" if count == 1 else f"{count} numbers"
-        raise ConfigError(f"{path}: at key {key}: {expected} expected, not {value!r}")
+        raise ConfigError(f"{path}: at key {key}: {expected} expected, not {value!r:.80}")
     return numbers

@@ -11,7 +11,7 @@ import pytest
 from glove_bridge.patterns import load_patterns
 from tests.chip.simulated_chip import SimulatedChip
 from tests.integration.test_up import Launcher, launched, wait_until_flying
-from tests.replay.flights import require_flight
+from tests.replay.flights import busiest_flight
 
 pytestmark = [pytest.mark.chip, pytest.mark.timeout(180)]
 
@@ -45,7 +45,7 @@ def felt_in(summary: dict[str, Any], patterns: str) -> dict[str, Any]:
 
 
 def test_the_summary_of_a_recorded_flight_tells_what_was_felt(chip: SimulatedChip, tmp_path: Path) -> None:
-    hand = f"recording:{require_flight('S1_tactile_1')}"
+    hand = f"recording:{busiest_flight(30.0)}"
     arguments = ("--hand", hand, "--seconds", "30", "--glove", chip.uri, "--patterns", "flight", "--json")
     with launched(tmp_path / "runs", "maze", *arguments) as process:
         glove = felt_in(fly(process), "flight")

@@ -1,5 +1,7 @@
 """One contract for every hand source: what `human_relay.sources.base.HandSource` promises."""
 
+import csv
+import gzip
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -9,14 +11,14 @@ import pytest
 
 from human_relay.sources import BACKENDS, open_source, source_hints
 from human_relay.sources.base import HandPose, HandSource
-from human_relay.sources.recording import read_recording, relative_yaw
 from human_relay.sources.scripted import REST
 from shared.clock import NS_PER_S
 from shared.config import structure_scenario
 from shared.errors import ConfigError
 from shared.messages import Wish
 from shared.recordings.flight_folder import HAND_FILE, read_track
-from tests.replay.flights import require_bag, require_flight
+from shared.recordings.hand import read_hand, relative_yaw
+from tests.replay.flights import a_bag_and_its_flight, a_flight, each_flight, read_json
 
 START = 5_000 * NS_PER_S
 LEAD = 0.5
@@ -36,9 +38,9 @@ URIS: dict[str, Callable[[Path], str]] = {
     "eight": lambda _: f"scripted:eight?duration=2&lead={LEAD}",
     "hold": lambda _: f"scripted:hold?duration=1&lead={LEAD}",
     "csv": lambda folder: f"recording:{csv_file(folder)}?lead={LEAD}",
-    "flight": lambda _: f"recording:{require_flight('S3_visual_1')}?lead={LEAD}",
-    "fast": lambda _: f"recording:{require_flight('S3_visual_1')}?lead={LEAD}&speed=2",
-    "bag": lambda _: f"recording:{require_bag('S3_visual_1.bag')}?lead={LEAD}",
+    "flight": lambda _: f"recording:{a_flight('visual')}?lead={LEAD}",
+    "fast": lambda _: f"recording:{a_flight('visual')}?lead={LEAD}&speed=2",
+    "bag": lambda _: f"recording:{a_bag_and_its_flight()[0]}?lead={LEAD}",
 }
 
 
@@ -166,41 +168,43 @@ def test_a_sweep_goes_where_it_is_told_and_back() -> None:
     assert places[-1] == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
-def test_a_recording_keeps_its_own_times_and_places() -> None:
-    folder = require_flight("S2_visual_1")
+@each_flight
+@pytest.mark.parametrize("speed", [0.3, 1.0, 2.0])
+def test_a_recording_is_played_by_time_at_the_rate_of_the_relay(folder: Path, speed: float) -> None:
     track = read_track(folder / HAND_FILE)
-    poses = play(open_source(f"recording:{folder}?lead=0", START))
-    assert [pose.t_ns - START for pose in poses] == (track.t_ns - track.t_ns[0]).tolist()
-    assert np.array_equal([pose.position for pose in poses], track.position)
-
-
-def test_speed_scales_time_only() -> None:
-    folder = require_flight("S2_visual_1")
-    slow, fast = (play(open_source(f"recording:{folder}?lead=0&speed={s}", START)) for s in (0.5, 2))
-    assert [pose.position for pose in slow] == [pose.position for pose in fast]
-    assert slow[-1].t_ns - START == pytest.approx(4 * (fast[-1].t_ns - START), abs=10)
+    poses = play(open_source(f"recording:{folder}?lead=0&speed={speed}", START), 300.0)
+    t = np.array([pose.t_ns - START for pose in poses])
+    assert np.array_equal(t, np.arange(len(t)) * NS_PER_S // 60)
+    own = track.t_ns - track.t_ns[0]
+    assert 0 <= own[-1] / speed - t[-1] <= NS_PER_S / 60
+    expected = np.stack([np.interp(t * speed, own, axis) for axis in track.position.T], axis=1)
+    assert np.abs(np.array([pose.position for pose in poses]) - expected).max() < 1e-9
 
 
 def test_a_bag_and_its_flight_folder_are_the_same_hand() -> None:
-    bag, folder = (
-        read_recording(path) for path in (require_bag("S3_visual_1.bag"), require_flight("S3_visual_1"))
-    )
+    bag, folder = (read_hand(path).checked.track for path in a_bag_and_its_flight())
     assert np.array_equal(bag.t_ns, folder.t_ns)
     assert np.allclose(bag.position, folder.position, atol=1e-8)
     assert np.allclose(bag.quaternion, folder.quaternion, atol=1e-5)
 
 
-def test_a_flight_folder_hints_at_the_law_that_flew() -> None:
-    hints = source_hints(f"recording:{require_flight('S2_visual_1')}")
+@each_flight
+def test_a_flight_folder_hints_at_the_law_that_flew(folder: Path) -> None:
+    hints, known = source_hints(f"recording:{folder}"), read_json(folder)
     assert hints["hand.mapping"] == "relative"
-    assert hints["hand.gain"] == 2.0
-    assert hints["hand.offset"] == [-3.112610226883, -0.6405413367832, 0.0]
-    assert hints["hand.home"] == pytest.approx([1.105715601117, 0.2361178732168])
-    assert hints["hand.clip"] == {"min": [-1.7, -1.5], "max": [1.7, 1.7]}
-    obstacles = hints["obstacles"]
-    assert isinstance(obstacles, list)
-    assert len(obstacles) == 26
-    assert obstacles[1] == {"name": "obstacle1", "x": -0.557574, "y": 0.667915}
+    assert hints["hand.gain"] == known["pos_coef"]
+    assert hints["hand.offset"] == [*known["base_offset_c"], 0.0]
+    low, high = zip(known["limits_x"], known["limits_y"], strict=True)
+    assert hints["hand.clip"] == {"min": list(low), "max": list(high)}
+    with gzip.open(folder / HAND_FILE, "rt", encoding="ascii") as file:
+        first = next(csv.DictReader(file))
+    wanted = np.array(known["base_offset_c"]) + known["pos_coef"] * np.array([float(first[a]) for a in "xy"])
+    assert hints["hand.home"] == pytest.approx(np.clip(wanted, low, high))
+    with (folder / "obstacles.csv").open(encoding="ascii") as file:
+        rows = list(csv.DictReader(file))
+    assert hints["obstacles"] == [
+        {"name": row["name"], "x": float(row["median_x"]), "y": float(row["median_y"])} for row in rows
+    ]
 
 
 def test_yaw_is_relative_and_does_not_jump_at_half_a_turn() -> None:
@@ -243,13 +247,18 @@ def test_a_missing_relative_path_is_named_in_full(tmp_path: Path, monkeypatch: p
         ("", "empty"),
         ("t,x,y\n0,0,0\n", "no column z; expected the header t,x,y,z, found t,x,y"),
         ("t,x,y,z\n", "no rows"),
-        ("t,x,y,z\n0,0,0,1\n1,0,zero,1\n", "row 3: could not convert string to float: 'zero'"),
-        ("t,x,y,z\n0,0,0,1\n1,0,0\n", "row 3"),
-        ("t,x,y,z\n0,0,0,nan\n", "row 2: 'nan' is not finite"),
-        ("t,x,y,z\n1,0,0,1\n1,0,0,1\n", "row 3: the time does not increase"),
+        ("t,x,y,z\n0,0,0,1\n1,0,zero,1\n", "line 3: could not convert string to float: 'zero'"),
+        ("\n\nt,x,y,z\n\n0,0,0,1\n1,0,zero,1\n", "line 6: could not convert"),
+        ('t,x,y,z,note\n0,0,0,1,"a\nb"\n1,0,zero,1,c\n', "line 4: could not convert"),
+        ("t,x,y,z\n0,0,0,1\n1,0,0\n2,0,0,1\n", "line 3: 3 cells, but 4 columns"),
+        ("t,x,y,z\n0,0,0,1\n1,0,0\n", "the last line, 3, is cut off"),
+        ("t,x,y,z\n0,0,0,nan\n", "1 pose is not a number (the first: line 2)"),
+        ("t,x,y,z\n1,0,0,1\n1,0,0,1\n", "1 pose is out of time (the first: line 2)"),
+        ("t,x,y,z\n0,0,0,1200\n1,5,0,1201\n", "are they millimetres?"),
+        ("t,x,y,z\n" + ",".join(["1"] * 100_000), "line 2: longer than 65536 characters"),
     ],
 )
-def test_a_wrong_recording_is_refused_with_file_and_row(tmp_path: Path, content: str, expected: str) -> None:
+def test_a_wrong_recording_is_refused_with_file_and_line(tmp_path: Path, content: str, expected: str) -> None:
     path = tmp_path / "hand.csv"
     path.write_text(content)
     with pytest.raises(ConfigError) as refused:
@@ -264,10 +273,13 @@ def test_a_folder_that_is_no_flight_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_broken_bag_or_another_topic_is_refused(tmp_path: Path) -> None:
-    whole = require_bag("S3_visual_1.bag")
+    whole, _ = a_bag_and_its_flight()
     with pytest.raises(ConfigError, match=r"choose with topic= one of .*/vicon/cf1/cf1"):
         open_source(f"recording:{whole}?topic=/vicon/wand/wand", START)
     broken = tmp_path / "broken.bag"
     broken.write_bytes(whole.read_bytes()[:5000])
-    with pytest.raises(ConfigError, match="not a readable ROS 1 bag"):
+    with pytest.raises(ConfigError, match=r"read up to byte \d+ of 5000: it is cut off there"):
+        open_source(f"recording:{broken}", START)
+    broken.write_bytes(b"#ROSBAG V1.2\n" + whole.read_bytes()[13:])
+    with pytest.raises(ConfigError, match="it does not begin as ROS 1 bags do"):
         open_source(f"recording:{broken}", START)

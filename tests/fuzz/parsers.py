@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import math
 from binascii import crc_hqx
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -29,8 +30,9 @@ from glove_bridge.patterns import FOLDER, load_patterns
 from glove_bridge.protocol import PROTOCOL, Ack, Hello, HelloReply, Message, Ping, Play, Set, Stop
 from glove_bridge.session import Session
 from human_relay.pointing import PointerState, hear
+from human_relay.sources.playback import PERIOD_NS
 from human_relay.sources.pointer import pointer_socket
-from human_relay.sources.recording import read_csv, relative_yaw
+from human_relay.sources.recording import RecordedHand
 from observer.console import protocol as page
 from observer.console.access import is_own_host, is_same_site, is_token
 from observer.console.pattern_file import read_patterns as read_page_patterns
@@ -48,7 +50,6 @@ from shared.plain_text import plain
 from shared.pointer_link import decode_pointed
 from shared.radio_link import decode_datagram, encode_head, radio_group
 from shared.recordings.flight_folder import read_meta, read_obstacles, read_patterns, read_track
-from shared.recordings.ros_bag import read_bag_tracks
 from shared.senses import Senses
 from shared.signature import blank, sign_with, verify_with
 from shared.topics import HAND, TOPICS, parse_key, rank
@@ -190,6 +191,14 @@ def _vehicle(data: bytes) -> object:
 def _trace(path: Path) -> object:
     trace = open_trace(path)
     return list(trace.records()), list(trace.messages()), trace.faults
+
+
+def _hand(path: Path) -> object:
+    """Reads a recorded hand and plays its begin."""
+    hand = RecordedHand(parse_uri(f"recording:{path}?lead=0", example=""), 0)
+    poses = [hand.poll(period * PERIOD_NS) for period in range(100)]
+    assert all(math.isfinite(x) for pose in poses if pose for x in (*pose.position, pose.yaw))
+    return poses, hand.remarks
 
 
 def _scenario(path: Path) -> object:
@@ -377,8 +386,8 @@ PARSERS = (
     ),
     Parser(
         name="hand-csv",
-        parse=_in_file("hand.csv", lambda path: relative_yaw(read_csv(path).quaternion)),
+        parse=_in_file("hand.csv", _hand),
         seeds=lambda: [b"t,x,y,z,yaw\n0,0,0,1,0\n0.1,0,0,1,0.1\n", b"t,x,y,z\n0,0,0,1\n1,0,0,1\n"],
     ),
-    Parser(name="bag", parse=_in_file("hand.bag", read_bag_tracks), seeds=seeds.bags),
+    Parser(name="bag", parse=_in_file("hand.bag", _hand), seeds=seeds.bags),
 )

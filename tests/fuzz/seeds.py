@@ -8,9 +8,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rosbags.rosbag1 import Writer
-from rosbags.typesys import Stores, get_typestore
-
 from agents.vehicles.base import Pose
 from agents.vehicles.link import Verb, encode_order, encode_pose
 from deploy.net.authority import create, issue
@@ -22,9 +19,10 @@ from shared.messages import FormationState, Heard, PatternEvent, ProcessStatus
 from shared.net.keyring import Keyring
 from shared.nodes import drone_node
 from shared.radio_link import encode_head
-from shared.recordings.ros_bag import TRANSFORM
+from shared.recordings.hand import BAG_TOPIC
 from shared.signature import blank, sign_with
 from shared.topics import HAND
+from tests.bags import ODOMETRY, POSE, TF, TRANSFORM, Body, steady, write_bag
 from tests.traces import flight, hand, state, write
 
 ZENOH_LOG = (
@@ -161,25 +159,11 @@ def tracks() -> list[bytes]:
 
 
 def bags() -> list[bytes]:
-    """Makes a ROS 1 bag with two poses of a hand."""
-    types = get_typestore(Stores.ROS1_NOETIC)
-    kind = types.types
+    """Makes a ROS 1 bag of every type with poses, and one that is cut off."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "hand.bag"
-        with Writer(path) as bag:
-            topic = bag.add_connection("/vicon/glove/glove", TRANSFORM, typestore=types)
-            for second in (1, 2):
-                message = kind[TRANSFORM](
-                    header=kind["std_msgs/msg/Header"](
-                        seq=second,
-                        stamp=kind["builtin_interfaces/msg/Time"](sec=second, nanosec=0),
-                        frame_id="world",
-                    ),
-                    child_frame_id="glove",
-                    transform=kind["geometry_msgs/msg/Transform"](
-                        translation=kind["geometry_msgs/msg/Vector3"](x=1.0, y=0.0, z=1.5),
-                        rotation=kind["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
-                    ),
-                )
-                bag.write(topic, second * 10**9, types.serialize_ros1(message, TRANSFORM))
-        return files(path)
+        written = [
+            write_bag(path, {BAG_TOPIC: Body(kind, steady(60))}).read_bytes()
+            for kind in (TRANSFORM, POSE, ODOMETRY, TF)
+        ]
+    return [*written, written[0][: len(written[0]) // 2]]

@@ -17,7 +17,7 @@ from shared.config import load_scenario
 from shared.messages import PatternEvent
 from tests.integration.bridged import BridgeListener
 from tests.integration.recorder import START_S, Recorder
-from tests.replay.flights import require_flight
+from tests.replay.flights import busiest_flight
 
 pytestmark = pytest.mark.timeout(150)
 
@@ -29,7 +29,7 @@ PERIOD_MS = 20.0
 
 
 def test_patterns_come_quickly_and_the_summary_lists_them(tmp_path: Path) -> None:
-    hand, glove = require_flight("S2_tactile_1"), tmp_path / "glove.jsonl"
+    hand, glove = busiest_flight(SECONDS), tmp_path / "glove.jsonl"
     command = [sys.executable, "-m", "deploy.cli", "up", "maze", "--hand", f"recording:{hand}", "--json"]
     command += ["--glove", f"record://{glove}", "--patterns", "flight-2018", "--runs", str(tmp_path)]
     file = tmp_path / "latest" / "scenario.toml"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.replay.flights import require_flight
+from tests.replay.flights import a_flight
 
 LEAST_USED = 0.98
 """Fraction of the hand's samples that a step uses on a busy machine; idle, it is 1 (docs/performance.md)."""
@@ -15,7 +15,7 @@ LEAST_USED = 0.98
 
 @pytest.mark.timeout(120)
 def test_the_maze_is_flown_by_the_recorded_hand(tmp_path: Path) -> None:
-    hand = f"recording:{require_flight('S2_visual_1')}"
+    hand = f"recording:{a_flight('visual')}"
     command = [
         sys.executable,
         "-m",

@@ -133,18 +133,23 @@ def test_a_flight_ends_with_its_hand(tmp_path: Path) -> None:
     assert json.loads(output.splitlines()[-1])["ok"] is True
 
 
-def test_a_hand_in_millimetres_makes_no_flight(tmp_path: Path) -> None:
-    rows = [f"{k / 60},{1000 + k},2000,1200" for k in range(120)]
-    (tmp_path / "mm.csv").write_text("\n".join(["t,x,y,z", *rows]) + "\n")
-    hand = f"recording:{tmp_path / 'mm.csv'}?lead=0"
+def test_a_hand_that_is_nowhere_makes_no_flight(tmp_path: Path) -> None:
+    rows = [f"{k / 60},{(-1) ** k * 15},0,1.2" for k in range(120)]
+    rows[60] = "1.0,,,"
+    (tmp_path / "hand.csv").write_text("\n".join(["t,x,y,z", *rows]) + "\n", encoding="ascii")
+    hand = f"recording:{tmp_path / 'hand.csv'}?lead=0"
     with launched(tmp_path, "rhombus", "--hand", hand, "--json") as process:
         output, errors = process.communicate(timeout=100)
     summary = json.loads(output.splitlines()[-1])
     assert (process.returncode, summary["ok"], summary["landed"]) == (1, False, True), errors
-    assert summary["hand"]["asked"] is False
     assert summary["hand"]["rejected"] > 50
+    said = "1 of 120 poses left out: 1 not a number (the first: line 62)"
+    assert summary["hand"]["remarks"] == [said]
+    assert errors.count(f"hand: {said}") == 2  # before the flight, and after it
     assert f"not ok: {summary['faults'][0]}" in errors
-    assert "in metres?" in (tmp_path / "latest" / "logs" / "relay.log").read_text()
+    log = (tmp_path / "latest" / "logs" / "relay.log").read_text()
+    assert "in metres?" in log
+    assert said in log
 
 
 def test_a_second_interrupt_does_not_wait_for_the_landing(tmp_path: Path) -> None:

@@ -18,12 +18,14 @@ from agents.vehicles.bodies.fleet import BODIES
 from agents.vehicles.bodies.pid import hovering
 from agents.vehicles.bodies.state import FLY
 from shared.recordings.flight_folder import read_setpoints, read_track
-from tests.replay.flights import ABSENT, flight_folders
+from tests.replay.flights import ABSENT, flight_folders, read_json
 from tests.values import vector
 
 Vec = npt.NDArray[np.float64]
 
 SUBSTEP = 0.004
+FITTED_TRIAL = 1
+"""The body was fitted on the first trials."""
 START_SPAN = 6  # frames of 60 Hz
 
 
@@ -77,7 +79,8 @@ def rms_by_run(runs: list[str], errors: list[Vec]) -> dict[str, float]:
 
 
 def test_identified_body_follows_the_real_drones(record_property: Callable[[str, object], None]) -> None:
-    flights = [read_flight(folder, drone) for folder in flight_folders() for drone in (1, 2, 3)]
+    folders = flight_folders()
+    flights = [read_flight(folder, drone) for folder in folders for drone in (1, 2, 3)]
     if not flights:
         pytest.skip(ABSENT)
     errors = [fly(f) - f.position[:, :2] for f in flights]
@@ -87,5 +90,6 @@ def test_identified_body_follows_the_real_drones(record_property: Callable[[str,
     for run, value in by_run.items():
         record_property(f"{run}_rms_mm", round(1e3 * value, 2))
         print(f"{run}: {1e3 * value:.1f} mm, set-points themselves {1e3 * lag_by_run[run]:.1f} mm")
-    assert np.mean([value for run, value in by_run.items() if run.endswith("_2")]) <= 0.022, by_run
+    unseen = [by_run[folder.name] for folder in folders if read_json(folder)["trial"] > FITTED_TRIAL]
+    assert not unseen or np.mean(unseen) <= 0.022, by_run
     assert all(by_run[run] < 0.5 * lag_by_run[run] for run in by_run), (by_run, lag_by_run)

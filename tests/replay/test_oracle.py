@@ -19,7 +19,7 @@ from shared.config import load_scenario
 from shared.formation import build_formation
 from shared.messages import HandSample
 from shared.scenario import Scenario
-from tests.replay.flights import DATA, require_flight
+from tests.replay.flights import DATA, longest_flight
 
 Vec = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -97,7 +97,7 @@ def check(uri: str, seconds: float, height_from: str) -> None:
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("height_from", ["hand", "references"])
 def test_the_goals_are_eqs_11_to_13_over_60_s_of_a_recorded_hand(height_from: str) -> None:
-    folder: Path = require_flight("S2_tactile_1")
+    folder: Path = longest_flight()
     assert folder.is_relative_to(DATA)
     check(f"recording:{folder}?lead=0", 60.0, height_from)
 

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from deploy.cli import main
+from shared.messages import Wish
+from tests.hands import still
 
 HAND = "scripted:sweep?stroke=0.5&peak=0.4&lead=0.2"
 
@@ -60,18 +62,36 @@ def test_a_flight_of_no_length_is_refused(capsys: pytest.CaptureFixture[str]) ->
     assert "must be 0.001 to 3,600" in capsys.readouterr().err
 
 
-def millimetres(folder: Path) -> str:
-    """A hand that was recorded in millimetres."""
-    rows = [f"{k / 60},{1000 + k},{2000 - k},1200" for k in range(90)]
-    (folder / "mm.csv").write_text("\n".join(["t,x,y,z", *rows]) + "\n")
-    return f"recording:{folder / 'mm.csv'}"
+def recording(folder: Path, rows: list[str]) -> str:
+    path = folder / "hand.csv"
+    path.write_text("\n".join(["t,x,y,z", *rows]) + "\n", encoding="ascii")
+    return f"recording:{path}"
+
+
+def test_a_hand_in_millimetres_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    hand = recording(tmp_path, [f"{k / 60},{1000 + k},{2000 - k},1200" for k in range(90)])
+    assert main(["sim", "rhombus", "--hand", hand]) == 2
+    assert "are they millimetres?" in capsys.readouterr().err
+
+
+def test_what_was_left_out_of_a_recorded_hand_is_in_the_summary(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [f"{k / 60},0,0,1.2" for k in range(90)]
+    rows[40] = rows[40].replace("1.2", "nan")
+    assert main(["sim", "rhombus", "--hand", recording(tmp_path, rows), "--seconds", "1", "--json"]) == 0
+    output = capsys.readouterr()
+    said = "1 of 90 poses left out: 1 not a number (the first: line 42)"
+    assert json.loads(output.out)["remarks"] == [said]
+    assert said in output.err
 
 
 @pytest.mark.parametrize("law", ["paper", "central"])
 def test_a_flight_in_which_nobody_flew_is_not_ok(
-    law: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    law: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    command = ["sim", "rhombus", "--law", law, "--seconds", "1", "--json", "--hand", millimetres(tmp_path)]
+    monkeypatch.setattr("deploy.lockstep.simulate.relayed", lambda *_: still(1.0, wish=Wish.HOLD))
+    command = ["sim", "rhombus", "--law", law, "--seconds", "1", "--json", "--hand", "scripted:hold"]
     assert main(command) == 1
     output = capsys.readouterr()
     summary = json.loads(output.out)

@@ -73,10 +73,15 @@ def components(name: str, values: Vec) -> dict[str, Vec]:
 
 
 def snapshots(record: FlightRecord, count: int) -> list[int]:
-    """Returns rows at equal horizontal distances along the way of the centroid, from the first to the last."""
-    way = np.linalg.norm(np.diff(record.position[:, :, :2].mean(axis=1), axis=0), axis=1).cumsum()
-    inner = np.searchsorted(way, np.linspace(0.0, way[-1], count)[1:-1])
-    return [0, *inner.tolist(), len(way)]
+    """Returns rows at equal horizontal distances along the way of the centroid, where everybody is known."""
+    everybody = np.column_stack([record.mapped, record.position.reshape(len(record.t), -1)])
+    there = np.flatnonzero(np.isfinite(everybody).all(axis=1))
+    if not len(there):
+        return []
+    way = np.linalg.norm(np.diff(record.position[there, :, :2].mean(axis=1), axis=0), axis=1).cumsum()
+    inner = np.searchsorted(way, np.linspace(0.0, way[-1], count)[1:-1]).tolist() if len(way) else []
+    rows: list[int] = there[[0, *inner, len(way)]].tolist()
+    return rows
 
 
 def legend_beside(axes: "Axes") -> None:
@@ -108,7 +113,7 @@ def draw_paths(axes: "Axes", record: FlightRecord) -> None:
 def frame_top_view(axes: "Axes", record: FlightRecord) -> None:
     """Shows the room as the operator sees it: forward (-x) is up, right (+y) is right."""
     shown = np.vstack([record.mapped, record.position.reshape(-1, 3)])
-    low, high = shown.min(axis=0) - 0.3, shown.max(axis=0) + 0.3
+    low, high = np.nanmin(shown, axis=0) - 0.3, np.nanmax(shown, axis=0) + 0.3
     axes.set(
         xlim=(low[1], high[1]),
         ylim=(high[0], low[0]),

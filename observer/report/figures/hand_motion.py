@@ -41,7 +41,8 @@ def _alike(displacement: Mapping[str, Vec]) -> list[tuple[list[str], Vec]]:
     """Groups links that give way alike: those with the same parameters."""
     groups: list[tuple[list[str], Vec]] = []
     for link, values in displacement.items():
-        group = next((group for group in groups if np.allclose(group[1], values, atol=_ALIKE)), None)
+        alike = (group for group in groups if np.allclose(group[1], values, atol=_ALIKE, equal_nan=True))
+        group = next(alike, None)
         if group is None:
             groups.append(([link], values))
         else:

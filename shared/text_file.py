@@ -1,0 +1,59 @@
+"""Text files from anywhere: whatever encoding an editor has chosen, and no more than a stated size."""
+
+import codecs
+from pathlib import Path
+
+LARGEST = 1 << 24
+"""Bytes of the largest file that is read at once: no configuration of ours is nearly as long."""
+
+_MARKS = (
+    # The mark of UTF-32 begins with that of UTF-16.
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+
+
+def encoding_of(head: bytes) -> str:
+    """Tells the encoding of a text by its first bytes: by its mark, or by the zeros of UTF-16; else UTF-8.
+
+    Args:
+        head: At least four bytes, if there are so many.
+    """
+    for mark, encoding in _MARKS:
+        if head.startswith(mark):
+            return encoding
+    if len(head) > 1 and 0 in head[:2]:
+        return "utf-16-le" if head[0] else "utf-16-be"
+    return "utf-8"
+
+
+def read_bytes(path: Path, most: int = LARGEST) -> bytes:
+    """Reads a whole file.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: It is larger than `most`, whatever it says about its size.
+    """
+    with path.open("rb") as stream:
+        data = stream.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"larger than {most >> 20} MiB")
+    return data
+
+
+def read_text(path: Path, most: int = LARGEST) -> str:
+    """Reads a whole file as text: UTF-8, with or without a mark, or UTF-16; lines end as in Unix.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: It is none of these, or larger than `most` bytes.
+    """
+    data = read_bytes(path, most)
+    try:
+        text = data.decode(encoding_of(data[:4]))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"no text in UTF-8 or UTF-16 ({error}); save it as UTF-8") from error
+    return text.replace("\r\n", "\n").replace("\r", "\n")
