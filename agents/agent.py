@@ -1,7 +1,8 @@
 """One drone's brain without I/O: bytes and time in, state out. The process loop and the simulator drive it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+from agents.company import Company, Memory, look_around
 from agents.control.avoidance import Encounter
 from agents.control.hand import HandInput
 from agents.control.modes import HAND_STALE
@@ -11,6 +12,7 @@ from agents.control.step import Inputs, Settings, State, start, step
 from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
+from shared.config import vehicle_settings
 from shared.fence import bodies_of
 from shared.formation import Formation
 from shared.messages import NO_HAND, DroneState, Flag, HandSample, Heard
@@ -28,12 +30,9 @@ SILENT_AFTER = 0.1
 """A drone unheard for this long is kept away from more and more, s ..."""
 SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
 """... from this distance on, growing at this rate, up to this, m and m/s."""
-FORGOTTEN_AFTER = 5.0
-"""After this long its body is no longer in the air, s ..."""
 DOUBTED_FOR = 1.0
-"""... unless somebody still speaks for it, be it what cannot be believed; that is told for this long, s."""
+"""That somebody says what cannot be believed is told for this long, s."""
 _DOUBTED_NS = round(DOUBTED_FOR * NS_PER_S)
-_FORGOTTEN_NS = round(FORGOTTEN_AFTER * NS_PER_S)
 _SILENT_NS = round(SILENT_AFTER * NS_PER_S)
 
 
@@ -59,6 +58,7 @@ class Agent:
         self._epoch = epoch
         self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
         self._kin = {kin.drone: DRONE_STATE.key(id=kin.drone) for kin in settings.kin}
+        self._memories = memories(scenario, neighbours(scenario, formation, drone))
         self._links = [link.name for link in settings.row.links]
         self._settings = settings
         self._rule = step_rule(scenario.rates)
@@ -90,7 +90,8 @@ class Agent:
         if self._state is None:
             self._state = start(pose.position, self._settings, airborne=pose.airborne)
         dt = (now_ns - self._last_step_ns) / NS_PER_S if self.steps else self._nominal_dt
-        inputs = self._inputs(now_ns, pose, pose_age)
+        company = self._look_around(now_ns)
+        inputs = self._inputs(now_ns, pose, pose_age, company)
         self._state, output = step(self._state, inputs, self._settings, dt)
         self._last_step_ns = now_ns
         links = self._state.links
@@ -110,6 +111,8 @@ class Agent:
             battery=pose.battery,
             flags=Flag(output.flags) | Flag.REJECTED_INPUT if self._doubts(now_ns) else Flag(output.flags),
             heard=self._note_used(self._state),
+            unheard=company.unheard,
+            lost=company.lost,
             step_ns=now_ns,
         )
         self.steps += 1
@@ -139,9 +142,17 @@ class Agent:
     def _is_fresh(self, key: str, sensed: Sensed[HandSample] | Sensed[DroneState]) -> bool:
         return self._used.get(key) is not sensed
 
-    def _inputs(self, now_ns: int, pose: Pose, pose_age: float) -> Inputs:
+    def _look_around(self, now_ns: int) -> Company:
+        senses = self.senses
+        doubted: dict[int, int] = {}
+        if senses.doubted_ns:
+            keys = {drone: DRONE_STATE.key(id=drone) for drone in self._memories}
+            doubted = {drone: senses.doubted_ns[key] for drone, key in keys.items() if key in senses.doubted_ns}
+        return look_around(self._drone, self._memories, senses.drones, doubted, now_ns)
+
+    def _inputs(self, now_ns: int, pose: Pose, pose_age: float, company: Company) -> Inputs:
         hand, heard = self.senses.hand, self.senses.drones
-        drones, silent = _around(self.senses, now_ns)
+        drones, silent = _around(company, now_ns)
         return Inputs(
             position=pose.position,
             velocity=pose.velocity,
@@ -154,6 +165,9 @@ class Agent:
             references=[self._reference(heard.get(kin), key, now_ns) for kin, key in self._kin.items()],
             drones=drones,
             silent=silent,
+            missed=company.missed,
+            awaiting=bool(company.awaited),
+            alone=company.alone,
         )
 
     def _reference(self, sensed: Sensed[DroneState] | None, key: str, now_ns: int) -> Reference | None:
@@ -200,25 +214,35 @@ def hand_input(sample: HandSample) -> HandInput:
     )
 
 
-def _around(senses: Senses, now_ns: int) -> tuple[list[Encounter], list[Bystander]]:
+def _around(company: Company, now_ns: int) -> tuple[list[Encounter], list[Bystander]]:
     """Returns where the other drones are, and who of them has fallen silent.
 
     One that is silent stays there for as long as its body may be in the air, and may drift or fall, but comes
     no closer. So does one that speaks and is not believed: what it says moves nobody, but it is there.
     """
     encounters, silent = [], []
-    for drone, sensed in senses.drones.items():
+    for sensed in company.heard:
         (x, y, _), (u, v, _) = sensed.message.position, sensed.message.velocity
-        if now_ns - sensed.arrival_ns <= _SILENT_NS:
-            encounters.append(Encounter(x, y, u, v))
-            continue
-        age = sensed.age(now_ns)
-        if age > FORGOTTEN_AFTER:
-            doubted_ns = senses.doubted_ns.get(DRONE_STATE.key(id=drone))
-            if doubted_ns is None or now_ns - doubted_ns > _FORGOTTEN_NS:
-                continue
-        moving = age <= DRONE_STATE.stale_s
-        encounters.append(Encounter(x, y, u, v) if moving else Encounter(x, y, 0.0, 0.0))
-        radius = min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST)
-        silent.append(Bystander(x, y, radius))
+        encounters.append(Encounter(x, y, u, v))
+        if now_ns - sensed.arrival_ns > _SILENT_NS:
+            silent.append(_bystander(x, y, sensed.age(now_ns)))
+    for seen in company.missing:
+        x, y, _ = seen.position
+        encounters.append(Encounter(x, y, 0.0, 0.0))
+        silent.append(_bystander(x, y, seen.age))
     return encounters, silent
+
+
+def _bystander(x: float, y: float, age: float) -> Bystander:
+    return Bystander(x, y, min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST))
+
+
+def memories(scenario: Scenario, others: Iterable[int]) -> dict[int, Memory]:
+    """Returns for how long each of some drones is remembered when it falls silent."""
+    limits = scenario.limits
+    return {
+        other: Memory(
+            vehicle_settings(scenario, other).link_loss == "hover", limits.takeoff_height, limits.landing_speed
+        )
+        for other in others
+    }

@@ -13,9 +13,9 @@ Two drones keep apart only while one of them knows where the other is. So:
 from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
-from agents.control.modes import HAND_LAND, TOUCHDOWN
+from agents.control.modes import GROUND, HAND_LAND, STOP, TOUCHDOWN
 from shared.clock import NS_PER_S
-from shared.messages import MOST_LOST, DroneState, Lost, Mode, Vector
+from shared.messages import MOST_LOST, DroneState, Mode, Seen
 from shared.senses import Sensed
 from shared.topics import DRONE_STATE
 
@@ -49,27 +49,13 @@ class Memory(NamedTuple):
             mode: What it said last.
             height: Where it was then, m.
         """
-        if mode is Mode.GROUND:
+        if mode is GROUND:
             return 0.0
-        if mode is Mode.STOP:
+        if mode is STOP:
             return FALL if height > TOUCHDOWN else 0.0
         if self.hovers:
             return float("inf")
         return HAND_LAND + max(height, self.takeoff_height) / self.landing_speed + SETTLING
-
-
-class Missing(NamedTuple):
-    """One that is not heard and may be in the air.
-
-    Attributes:
-        position: Where it was seen last, m.
-        velocity: How it moved then, m/s; at rest if somebody else saw it.
-        age: How long ago, s.
-    """
-
-    position: Vector
-    velocity: Vector
-    age: float
 
 
 class Company(NamedTuple):
@@ -77,9 +63,9 @@ class Company(NamedTuple):
 
     Attributes:
         heard: The newest of everybody who is heard.
-        missing: Who is not heard and may be in the air.
+        missing: Who is not heard and may be in the air, as it was seen last.
         unheard: Numbers of all who are not heard, for the others.
-        lost: Where those were seen last, for the others.
+        lost: As what those were seen last, for the others.
         awaited: Those of them of whom nothing is known at all.
         deaf: Those whom this drone hears, and who do not hear it.
         missed: Whether it is not heard where it should be, and so must not count on being avoided.
@@ -87,13 +73,16 @@ class Company(NamedTuple):
     """
 
     heard: list[Sensed[DroneState]]
-    missing: list[Missing]
+    missing: list[Seen]
     unheard: tuple[int, ...]
-    lost: tuple[Lost, ...]
+    lost: tuple[Seen, ...]
     awaited: tuple[int, ...]
     deaf: frozenset[int]
     missed: bool
     alone: bool
+
+
+_NOBODY: frozenset[int] = frozenset()
 
 
 def look_around(
@@ -121,53 +110,59 @@ def look_around(
         else:
             silent.append(other)
     reports = [sensed.message for sensed in heard if sensed.message.unheard]
-    deaf = frozenset(report.id for report in reports if drone in report.unheard) if reports else frozenset()
+    deaf = frozenset(report.id for report in reports if drone in report.unheard) if reports else _NOBODY
     if not silent:
         return Company(heard, [], (), (), (), deaf, missed=bool(deaf), alone=False)
-    lost: list[Lost] = []
-    velocities: dict[int, Vector] = {}
-    awaited = []
-    for other in silent:
-        sensed = known.get(other)
-        seen = _own(sensed, memories[other], doubted_ns.get(other), now_ns) if sensed else _told(other, reports)
-        if seen is None:
-            awaited.append(other)
-            continue
-        lost.append(seen)
-        if sensed is not None:
-            velocities[other] = sensed.message.velocity
-    flying = [seen for seen in lost if not seen.down]
-    alone = not heard
-    broken = any(seen.id < drone and _is_heard_elsewhere(seen.id, heard) for seen in flying)
+    seen = _seen(silent, known, reports, now_ns)
+    missing = [each for each in seen if _may_fly(each, memories[each.id], doubted_ns.get(each.id), now_ns)]
+    awaited = tuple(set(silent) - {each.id for each in seen})
+    cut_off = not heard and bool(missing or awaited)
+    broken = any(each.id < drone and _is_heard_elsewhere(each.id, heard) for each in missing)
     return Company(
         heard=heard,
-        missing=[Missing(seen.position, velocities.get(seen.id, _AT_REST), seen.age) for seen in flying],
+        missing=missing,
         unheard=tuple(silent),
-        lost=tuple(sorted(lost, key=lambda seen: (seen.down, seen.age))[:MOST_LOST]),
-        awaited=tuple(awaited),
+        lost=tuple(sorted(seen, key=lambda each: (each not in missing, each.age))[:MOST_LOST]),
+        awaited=tuple(sorted(awaited)),
         deaf=deaf,
-        missed=bool(deaf) or broken or (alone and (bool(flying) or bool(awaited))),
-        alone=alone,
+        missed=bool(deaf) or broken or cut_off,
+        alone=not heard,
     )
 
 
-_AT_REST: Vector = (0.0, 0.0, 0.0)
+def _seen(
+    silent: Iterable[int],
+    known: Mapping[int, Sensed[DroneState]],
+    reports: Collection[DroneState],
+    now_ns: int,
+) -> list[Seen]:
+    """Returns as what the silent ones were seen last: by this drone itself, or else by others."""
+    found = []
+    for other in silent:
+        sensed = known.get(other)
+        seen = _told(other, reports) if sensed is None else _own(sensed, now_ns)
+        if seen is not None:
+            found.append(seen)
+    return found
 
 
-def _own(sensed: Sensed[DroneState], memory: Memory, doubted_ns: int | None, now_ns: int) -> Lost:
-    """Returns where this drone itself saw one that it no longer hears."""
+def _own(sensed: Sensed[DroneState], now_ns: int) -> Seen:
     state = sensed.message
-    # Somebody still speaks for it, be it what cannot be believed: so long it may be anywhere but forgotten.
-    last_ns = max(sensed.arrival_ns, doubted_ns or 0)
-    down = (now_ns - last_ns) / NS_PER_S > memory.lasts(state.mode, state.position[2])
-    return Lost(state.id, state.epoch, state.seq, state.position, sensed.age(now_ns), down)
+    return Seen(
+        state.id, state.epoch, state.seq, state.position, state.velocity, state.mode, sensed.age(now_ns)
+    )
 
 
-def _told(other: int, reports: Iterable[DroneState]) -> Lost | None:
-    """Returns where others saw one last whom this drone never heard; who doubts that it is down is right."""
-    seen = [lost for report in reports for lost in report.lost if lost.id == other]
-    return max(seen, key=lambda lost: (lost.epoch, lost.seq, not lost.down), default=None)
+def _told(other: int, reports: Iterable[DroneState]) -> Seen | None:
+    seen = [each for report in reports for each in report.lost if each.id == other]
+    return max(seen, key=lambda each: (each.epoch, each.seq, -each.age), default=None)
 
 
-def _is_heard_elsewhere(other: int, heard: Collection[Sensed[DroneState]]) -> bool:
+def _may_fly(seen: Seen, memory: Memory, doubted_ns: int | None, now_ns: int) -> bool:
+    # While somebody speaks for it, be it what cannot be believed, it may be anywhere but forgotten.
+    age = seen.age if doubted_ns is None else min(seen.age, (now_ns - doubted_ns) / NS_PER_S)
+    return age <= memory.lasts(seen.mode, seen.position[2])
+
+
+def _is_heard_elsewhere(other: int, heard: Iterable[Sensed[DroneState]]) -> bool:
     return any(other not in sensed.message.unheard for sensed in heard)

@@ -94,21 +94,19 @@ class Heard(NamedTuple):
 
 
 MOST_LOST = 16
-"""Of so many lost drones at most the places are told."""
+"""Of so many drones that it no longer hears one says at most where they were."""
 
 
-class Lost(NamedTuple):
-    """A drone that somebody no longer hears: where it was seen last, and whether it can still be in the air.
-
-    `epoch` and `seq` are those of the state in which it was seen, `age` (s) is how long ago that was heard.
-    """
+class Seen(NamedTuple):
+    """A drone as somebody heard it last: what it said in the state `(epoch, seq)`, `age` seconds ago."""
 
     id: DroneId
     epoch: UInt64
     seq: UInt64
     position: Position
+    velocity: Velocity
+    mode: Mode
     age: Seconds
-    down: bool
 
 
 NO_FLAGS = Flag(0)
@@ -174,7 +172,7 @@ class DroneState(Message, frozen=True, kw_only=True):
     flags: Flag = NO_FLAGS
     heard: dict[str, Heard] = {}
     unheard: tuple[DroneId, ...] = ()
-    lost: tuple[Lost, ...] = ()
+    lost: tuple[Seen, ...] = ()
     step_ns: UInt64 = 0
 
 

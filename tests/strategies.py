@@ -16,11 +16,11 @@ from shared.messages import (
     FormationState,
     HandSample,
     Heard,
-    Lost,
     Message,
     Mode,
     PatternEvent,
     ProcessStatus,
+    Seen,
     Wish,
 )
 
@@ -37,7 +37,9 @@ NAMES = st.text(max_size=12)
 NOT_NEGATIVE = st.floats(0.0, 1e9)
 ENVELOPE = {"epoch": UINT64, "seq": UINT64, "stamp_ns": UINT64}
 HEARD = st.dictionaries(NAMES, st.builds(Heard, UINT64, UINT64, UINT64), max_size=4)
-LOST = st.builds(Lost, st.integers(1, 65_535), UINT64, UINT64, POSITIONS, NOT_NEGATIVE, st.booleans())
+LOST = st.builds(
+    Seen, st.integers(1, 65_535), UINT64, UINT64, POSITIONS, VELOCITIES, st.sampled_from(Mode), NOT_NEGATIVE
+)
 
 MESSAGES: dict[type[Message], st.SearchStrategy[Any]] = {
     HandSample: st.builds(

@@ -15,6 +15,10 @@ HAND_HOLD: Final = 1.0
 """After this long without the hand: HOLD, s."""
 HAND_LAND: Final = 10.0
 """After this long without the hand: LAND, s."""
+MISSED_HOLD: Final = 0.25
+"""A drone that is missed by others for this long holds where it is, s ..."""
+MISSED_LAND: Final = HAND_LAND
+"""... and for this long lands, s."""
 POSE_FRESH: Final = 0.1
 """Take-off needs a pose at most this old, s."""
 ARRIVED: Final = 0.10
@@ -53,13 +57,19 @@ class ModeInputs:
         battery: Charge, 0..1.
         height: Height of the body, m; of where it should be while the pose is lost.
         takeoff_height: Height at which it joins the formation, m.
+        missed_for: How long others have not heard this drone, or it not them, s.
         references_follow: Every reference is in FOLLOW.
+        awaiting: It does not know of everybody whom it must avoid.
+        alone: It hears nobody although there are others.
     """
 
     __slots__ = (
+        "alone",
+        "awaiting",
         "battery",
         "hand_age",
         "height",
+        "missed_for",
         "pose_age",
         "references_follow",
         "takeoff_height",
@@ -74,8 +84,11 @@ class ModeInputs:
         battery: float,
         height: float,
         takeoff_height: float,
+        missed_for: float,
         *,
         references_follow: bool,
+        awaiting: bool,
+        alone: bool,
     ) -> None:
         self.wish: Final = wish
         self.hand_age: Final = hand_age
@@ -83,7 +96,10 @@ class ModeInputs:
         self.battery: Final = battery
         self.height: Final = height
         self.takeoff_height: Final = takeoff_height
+        self.missed_for: Final = missed_for
         self.references_follow: Final = references_follow
+        self.awaiting: Final = awaiting
+        self.alone: Final = alone
 
 
 @final
@@ -149,12 +165,13 @@ def _to(mode: Mode, state: ModeState) -> ModeState:
 
 def _ground(state: ModeState, inputs: ModeInputs) -> ModeState:
     able = inputs.pose_age <= POSE_FRESH and inputs.battery > CRITICAL_BATTERY
-    ready = able and _flown_by_hand(inputs) and not state.must_ask_again
+    in_touch = not inputs.awaiting and not inputs.alone and inputs.missed_for == 0.0
+    ready = able and in_touch and _flown_by_hand(inputs) and not state.must_ask_again
     return _to(TAKEOFF, state) if ready else state
 
 
 def _takeoff(state: ModeState, inputs: ModeInputs) -> ModeState:
-    if _landing_wished(inputs) or inputs.hand_age > HAND_LAND:
+    if _landing_wished(inputs) or inputs.hand_age > HAND_LAND or inputs.missed_for > MISSED_LAND:
         return _land(inputs)
     if inputs.height >= inputs.takeoff_height - ARRIVED:
         return _to(FOLLOW if _may_follow(inputs) else HOLD, state)
@@ -162,16 +179,17 @@ def _takeoff(state: ModeState, inputs: ModeInputs) -> ModeState:
 
 
 def _follow(state: ModeState, inputs: ModeInputs) -> ModeState:
-    if _landing_wished(inputs) or inputs.hand_age > HAND_LAND:
+    if _landing_wished(inputs) or inputs.hand_age > HAND_LAND or inputs.missed_for > MISSED_LAND:
         return _land(inputs)
-    held = inputs.wish is _HOLD_WISH or inputs.hand_age > HAND_HOLD or not inputs.references_follow
+    lost = inputs.awaiting or inputs.missed_for > MISSED_HOLD or inputs.hand_age > HAND_HOLD
+    held = lost or inputs.wish is _HOLD_WISH or not inputs.references_follow
     return _to(HOLD, state) if held else state
 
 
 def _hold(state: ModeState, inputs: ModeInputs) -> ModeState:
     # A process that has never heard a hand holds: whoever started it can still land it by hand or by STOP.
     silent = inputs.hand_age > HAND_LAND and not math.isinf(inputs.hand_age)
-    if _landing_wished(inputs) or silent:
+    if _landing_wished(inputs) or silent or inputs.missed_for > MISSED_LAND:
         return _land(inputs)
     return _to(FOLLOW, state) if _may_follow(inputs) else state
 
@@ -191,4 +209,5 @@ def _flown_by_hand(inputs: ModeInputs) -> bool:
 
 
 def _may_follow(inputs: ModeInputs) -> bool:
-    return _flown_by_hand(inputs) and inputs.references_follow
+    in_touch = not inputs.awaiting and inputs.missed_for <= MISSED_HOLD
+    return in_touch and _flown_by_hand(inputs) and inputs.references_follow

@@ -37,6 +37,8 @@ OLD_POSE: Final[int] = Flag.OLD_POSE.value
 HAND_STALE: Final[int] = Flag.HAND_STALE.value
 REFERENCE_LOST: Final[int] = Flag.REFERENCE_LOST.value
 AVOIDING: Final[int] = Flag.AVOIDING.value
+WAITING: Final[int] = Flag.WAITING.value
+MISSED: Final[int] = Flag.MISSED.value
 
 
 @final
@@ -103,14 +105,20 @@ class Inputs:
         references: What is known of each of the kin; None where never heard.
         drones: Every other drone.
         silent: Those of them that have fallen silent, where they may be by now.
+        missed: Others do not hear this drone, or it does not hear them.
+        awaiting: It does not know of everybody whom it must avoid.
+        alone: It hears nobody although there are others.
     """
 
     __slots__ = (
+        "alone",
+        "awaiting",
         "battery",
         "drones",
         "hand",
         "hand_age",
         "hand_fresh",
+        "missed",
         "pose_age",
         "position",
         "references",
@@ -133,6 +141,9 @@ class Inputs:
         references: list[Reference | None],
         drones: list[Encounter],
         silent: list[Bystander],
+        missed: bool,
+        awaiting: bool,
+        alone: bool,
     ) -> None:
         self.position: Final = position
         self.velocity: Final = velocity
@@ -145,6 +156,9 @@ class Inputs:
         self.references: Final = references
         self.drones: Final = drones
         self.silent: Final = silent
+        self.missed: Final = missed
+        self.awaiting: Final = awaiting
+        self.alone: Final = alone
 
 
 @final
@@ -158,10 +172,20 @@ class State:
         trajectory: Reference of the set-point.
         anchor: Own goal while no reference is usable, m.
         blocked_for: How long the drone has not arrived, s.
+        missed_for: How long others have not heard it, or it not them, s.
         stand_ins: How far each of the kin has been replaced; none while all speak for themselves.
     """
 
-    __slots__ = ("anchor", "blocked_for", "hand", "links", "mode", "stand_ins", "trajectory")
+    __slots__ = (
+        "anchor",
+        "blocked_for",
+        "hand",
+        "links",
+        "missed_for",
+        "mode",
+        "stand_ins",
+        "trajectory",
+    )
 
     def __init__(
         self,
@@ -171,6 +195,7 @@ class State:
         trajectory: Trajectory,
         anchor: Vector,
         blocked_for: float,
+        missed_for: float,
         stand_ins: tuple[StandIn, ...],
     ) -> None:
         self.mode: Final = mode
@@ -179,6 +204,7 @@ class State:
         self.trajectory: Final = trajectory
         self.anchor: Final = anchor
         self.blocked_for: Final = blocked_for
+        self.missed_for: Final = missed_for
         self.stand_ins: Final = stand_ins
 
 
@@ -211,6 +237,7 @@ def start(position: Vector, settings: Settings, *, airborne: bool) -> State:
         trajectory=start_at(position),
         anchor=position,
         blocked_for=0.0,
+        missed_for=0.0,
         stand_ins=(),
     )
 
@@ -230,13 +257,16 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
     direct = len(settings.row.weights) - 1
     stand_ins = _stand_ins(state, inputs, settings, dt)
     lead = _lead(stand_ins, state.hand, inputs, settings, direct)
-    mode_state = next_mode(state.mode, _mode_inputs(state, inputs, settings, lead))
+    missed_for = state.missed_for + dt if inputs.missed else 0.0
+    mode_state = next_mode(state.mode, _mode_inputs(state, inputs, settings, lead, missed_for))
     mode = mode_state.mode
     hand = _hand(state, inputs, mode, settings.hand)
     velocity = ORIGIN if hand is None else rotate(hand.velocity, -hand.yaw)
     links = step_links(state.links, settings.row.links, velocity, dt)
 
-    if modes.is_guided(mode) and lead is not None and hand is not None:
+    # Who is missed stays where the others saw it last.
+    in_touch = missed_for <= modes.MISSED_HOLD
+    if modes.is_guided(mode) and in_touch and lead is not None and hand is not None:
         goal, goal_velocity = goal_of(settings.row, links, hand, lead)
         anchor = state.trajectory.point
     else:
@@ -250,7 +280,9 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
     flags = _flags(inputs, steered, stand_ins, direct, usable=lead is not None)
     if blocked_for > BLOCKED_TIME:
         flags |= BLOCKED
-    after = State(mode_state, hand, links, steered.trajectory, anchor, blocked_for, stand_ins)
+    if not in_touch:
+        flags |= MISSED
+    after = State(mode_state, hand, links, steered.trajectory, anchor, blocked_for, missed_for, stand_ins)
     return after, Output(goal, goal_velocity, steered.setpoint, flags)
 
 
@@ -286,7 +318,9 @@ def _lead(
     return lead
 
 
-def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Guide] | None) -> ModeInputs:
+def _mode_inputs(
+    state: State, inputs: Inputs, settings: Settings, lead: list[Guide] | None, missed_for: float
+) -> ModeInputs:
     lost = inputs.pose_age > modes.POSE_LOST
     return ModeInputs(
         inputs.wish,
@@ -295,7 +329,10 @@ def _mode_inputs(state: State, inputs: Inputs, settings: Settings, lead: list[Gu
         inputs.battery,
         state.anchor[2] if lost else inputs.position[2],
         settings.takeoff_height,
+        missed_for,
         references_follow=lead is not None and all_follow(lead),
+        awaiting=inputs.awaiting,
+        alone=inputs.alone,
     )
 
 
@@ -363,4 +400,6 @@ def _flags(
         flags |= FENCE
     if steered.avoiding:
         flags |= AVOIDING
+    if inputs.awaiting or inputs.alone:
+        flags |= WAITING
     return flags

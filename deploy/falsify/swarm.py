@@ -16,7 +16,7 @@ from agents.vehicles.bodies.state import CUT, DESCEND, FLY, IDLE
 from deploy.falsify.air import Air
 from deploy.falsify.case import Case, FaultKind
 from deploy.falsify.hand import poses, samples
-from deploy.lockstep.start import rest_places, start_flyers
+from deploy.lockstep.start import EPOCH, introduce, rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.arrays import Vec
 from shared.clock import NS_PER_S
@@ -112,7 +112,9 @@ class Swarm:
         self._flyers = start_flyers(scenario, formation, places, airborne=case.airborne)
         listens = {drone: neighbours(scenario, formation, drone) for drone in formation.ids}
         self._air = Air(case, formation.ids, listens, self._rate)
-        self._agents: list[Agent | None] = [self._agent(drone, 0) for drone in formation.ids]
+        agents = [self._agent(drone, EPOCH) for drone in formation.ids]
+        introduce(agents, formation, self._flyers)
+        self._agents: list[Agent | None] = [*agents]
         self._told: list[tuple[int, Vector, int]] = [(CUT, (0.0, 0.0, 0.0), 0)] * len(formation.ids)
         self._poses: dict[int, tuple[Pose, int]] = {}
         self._modes = [Mode.GROUND] * len(formation.ids)

@@ -16,7 +16,7 @@ from agents.vehicles.bodies.fleet import Flyer, advance, pose_of
 from agents.vehicles.bodies.state import CUT, FLY, IDLE
 from deploy.lockstep.hand_track import map_samples, track_of
 from deploy.lockstep.record import Moment, Record, make_record
-from deploy.lockstep.start import rest_places, start_flyers
+from deploy.lockstep.start import EPOCH, introduce, rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.codec import encode
 from shared.formation import Formation
@@ -57,9 +57,10 @@ class Lockstep:
         self._rate = scenario.rates.control_hz
         self._order = [row for level in formation.levels for row in level]
         self._agents = [
-            Agent(scenario, formation, drone, agent_settings(scenario, formation, drone), epoch=0)
+            Agent(scenario, formation, drone, agent_settings(scenario, formation, drone), epoch=EPOCH)
             for drone in formation.ids
         ]
+        introduce(self._agents, formation, self.flyers)
         self._keys = [DRONE_STATE.key(id=drone) for drone in formation.ids]
         self._listeners = {
             key: [agent.senses for agent in self._agents if key in agent.senses.keys]

@@ -1,15 +1,21 @@
 """Where a simulated run starts: bodies in the rest formation about the hand, or on the ground below it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 
+from agents.agent import Agent
 from agents.control.hand import MappedHand
 from agents.control.vectors import rotate
-from agents.vehicles.bodies.fleet import Flyer, hover, park_fleet
+from agents.vehicles.bodies.fleet import Flyer, hover, park_fleet, pose_of
 from shared.config import vehicle_settings
 from shared.formation import Formation
-from shared.messages import Vector
+from shared.messages import ORIGIN, DroneState, Mode, Vector
 from shared.scenario import Scenario
+from shared.senses import Sensed
+from shared.topics import DRONE_STATE
+
+EPOCH = 1
+"""Of agents in lockstep; what they heard of each other before is older."""
 
 
 def rest_places(formation: Formation, hand: MappedHand) -> list[Vector]:
@@ -41,3 +47,28 @@ def start_flyers(
     if not airborne:
         return parked
     return [hover(flyer, held=row in held) for row, flyer in enumerate(parked)]
+
+
+def introduce(agents: Iterable[Agent], formation: Formation, flyers: Sequence[Flyer]) -> None:
+    """Lets every agent hear everybody once, as they have on the ground before a flight begins."""
+    states = [_resting(drone, flyer) for drone, flyer in zip(formation.ids, flyers, strict=True)]
+    for agent in agents:
+        for state in states:
+            if DRONE_STATE.key(id=state.id) in agent.senses.keys:
+                agent.senses.hear_drone(Sensed(state, 0))
+
+
+def _resting(drone: int, flyer: Flyer) -> DroneState:
+    pose = pose_of(flyer, 1.0, 0)
+    return DroneState(
+        epoch=EPOCH - 1,
+        seq=0,
+        stamp_ns=0,
+        id=drone,
+        position=pose.position,
+        velocity=ORIGIN,
+        goal=pose.position,
+        goal_velocity=ORIGIN,
+        setpoint=pose.position,
+        mode=Mode.HOLD if pose.airborne else Mode.GROUND,
+    )

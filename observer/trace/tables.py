@@ -8,7 +8,7 @@ from typing import Any
 
 from observer.trace.read import Trace
 from shared.clock import NS_PER_S
-from shared.messages import Heard, Lost, Message
+from shared.messages import Heard, Message, Seen
 from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, rank, topic_of
 
 ALIGNED = "aligned.csv"
@@ -145,7 +145,7 @@ def _flatten(name: str, value: Any, cells: Row) -> None:
     elif isinstance(value, tuple) and len(value) == 3 and all(isinstance(item, float) for item in value):
         cells.update({f"{name}_{axis}": item for axis, item in zip("xyz", value, strict=True)})
     elif isinstance(value, tuple):
-        cells[name] = " ".join(str(item.id if isinstance(item, Lost) else item) for item in value)
+        cells[name] = " ".join(str(item.id if isinstance(item, Seen) else item) for item in value)
     elif isinstance(value, dict):
         for key, item in value.items():
             _flatten(f"{name}.{key}", item, cells)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from shared.codec import MAX_PAYLOAD, encode
 from shared.config import vehicle_settings
 from shared.formation import Formation, Link
-from shared.messages import MAX_POSITION, MOST_LOST, DroneState, Heard, Lost, Mode, Vector
+from shared.messages import MAX_POSITION, MOST_LOST, DroneState, Heard, Mode, Seen, Vector
 from shared.nodes import all_nodes
 from shared.scenario import MAX_PORT, Scenario
 from shared.scenario_check.finding import Finding
@@ -103,7 +103,7 @@ def _longest_state(formation: Formation, drone: int) -> DroneState:
     heard = Heard(*[_LARGEST_NUMBER] * 3)
     keys = [HAND.key(), *(DRONE_STATE.key(id=other) for other in formation.ancestors(drone))]
     others = tuple(other for other in formation.ids if other != drone)
-    lost = Lost(max(formation.ids), _LARGEST_NUMBER, _LARGEST_NUMBER, _FAR, 1.0 / 3.0, down=True)
+    lost = Seen(max(formation.ids), _LARGEST_NUMBER, _LARGEST_NUMBER, _FAR, _FAR, Mode.TAKEOFF, 1.0 / 3.0)
     return DroneState(
         epoch=_LARGEST_NUMBER,
         seq=_LARGEST_NUMBER,

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from agents.agent import Agent
+from agents.company import SETTLING
+from agents.control.modes import HAND_LAND, MISSED_HOLD, MISSED_LAND
 from agents.loop import PoseWatch, command, run
 from agents.settings import agent_settings
 from agents.vehicles.base import Pose
@@ -91,10 +93,45 @@ def test_alone_on_the_ground_it_says_so_and_steps_at_the_slow_rate() -> None:
     assert brain.step(T0 + 25 * MS, GROUNDED, 0.02).seq == 1
 
 
-def test_it_takes_off_when_the_hand_wants_to_fly() -> None:
+def test_it_takes_off_when_the_hand_wants_to_fly_and_everybody_is_heard() -> None:
     brain = agent(1)
     hear(brain, T0, hand(0))
-    assert brain.step(T0, GROUNDED, 0.0).mode is Mode.TAKEOFF
+    alone = brain.step(T0, GROUNDED, 0.0)
+    assert (alone.mode, alone.unheard) == (Mode.GROUND, (2, 3, 4))
+    assert Flag.WAITING in alone.flags
+    hear(brain, T0 + MS, *(state(other, 0, Mode.GROUND) for other in (2, 3)))
+    waiting = brain.step(T0 + MS, GROUNDED, 0.0)
+    assert (waiting.mode, waiting.unheard) == (Mode.GROUND, (4,))
+    hear(brain, T0 + 2 * MS, state(4, 0, Mode.GROUND))
+    ready = brain.step(T0 + 2 * MS, GROUNDED, 0.0)
+    assert (ready.mode, ready.unheard) == (Mode.TAKEOFF, ())
+    assert Flag.WAITING not in ready.flags
+
+
+def test_it_stays_on_the_ground_while_somebody_does_not_hear_it() -> None:
+    brain = agent(1)
+    deaf = replace(state(4, 0, Mode.GROUND), unheard=(1,))
+    hear(brain, T0, hand(0), state(2, 0, Mode.GROUND), state(3, 0, Mode.GROUND), deaf)
+    assert brain.step(T0, GROUNDED, 0.0).mode is Mode.GROUND
+
+
+def test_whom_nobody_hears_holds_where_it_is_and_lands_before_it_is_forgotten() -> None:
+    brain = agent(1)
+    modes: dict[Mode, float] = {}
+    held: set[Vector] = set()
+    for tick in range(700):
+        now = T0 + tick * 16 * MS
+        deaf = replace(state(2, tick), unheard=(1,) if tick >= 60 else ())
+        hear(brain, now, hand(tick, (0.001 * tick, 0.0, 1.2)), deaf, state(3, tick), state(4, tick))
+        told = brain.step(now, FLYING, 0.0)
+        modes.setdefault(told.mode, (now - T0) / NS_PER_S)
+        if told.mode is Mode.HOLD:
+            held.add(told.goal)
+    assert list(modes) == [Mode.FOLLOW, Mode.HOLD, Mode.LAND]
+    assert len(held) == 1
+    assert modes[Mode.HOLD] == pytest.approx(0.96 + MISSED_HOLD, abs=0.04)
+    assert modes[Mode.LAND] == pytest.approx(0.96 + MISSED_LAND, abs=0.04)
+    assert Flag.MISSED in told.flags
 
 
 @pytest.mark.parametrize("wish", [Wish.GROUND, Wish.HOLD, Wish.LAND])
@@ -115,7 +152,8 @@ def test_a_restarted_agent_reads_its_pose_and_holds_where_it_is() -> None:
 def test_it_rejoins_when_hand_and_references_are_there() -> None:
     brain = agent(4)
     brain.step(T0, FLYING, 0.0)
-    hear(brain, T0, hand(0), state(2, 5, position=(-1.0, 0.5, 1.2)), state(3, 5, position=(-1.0, -0.5, 1.2)))
+    hear(brain, T0, hand(0), state(1, 5, position=(-0.5, 0.0, 1.2)))
+    hear(brain, T0, state(2, 5, position=(-1.0, 0.5, 1.2)), state(3, 5, position=(-1.0, -0.5, 1.2)))
     joined = brain.step(T0 + 10 * MS, FLYING, 0.0)
     assert joined.mode is Mode.FOLLOW
     assert joined.goal == pytest.approx((-1.5, 0.0, 1.2))
@@ -208,6 +246,7 @@ def test_a_slow_pursuit_does_not_depend_on_the_year() -> None:
         for tick in range(1, 60):
             now = T0 + tick * 16 * MS
             hear(brain, now, hand(tick, position=(1.0, 0.0, 1.2), epoch=epoch))
+            hear(brain, now, *(state(other, tick, position=(-3.0, other, 1.2)) for other in (2, 3, 4)))
             latest = brain.step(now, FLYING, 0.0)
         goals.append(latest.goal)
     # 59 samples at 60 Hz and 0.75 m/s, less the displacement of the link.
@@ -264,7 +303,8 @@ class FakeVehicle:
 
 def encounters(brain: Agent, at: int) -> list[Vector]:
     """Returns where a drone believes the others to be."""
-    return [(each.x, each.y, 0.0) for each in brain._inputs(at, FLYING, 0.0).drones]
+    company = brain._look_around(at)
+    return [(each.x, each.y, 0.0) for each in brain._inputs(at, FLYING, 0.0, company).drones]
 
 
 def test_a_liar_moves_nobody_and_its_body_is_not_forgotten_while_it_speaks() -> None:
@@ -278,7 +318,9 @@ def test_a_liar_moves_nobody_and_its_body_is_not_forgotten_while_it_speaks() -> 
         assert Flag.REJECTED_INPUT in told.flags
         assert encounters(brain, now) == [(-1.0, 0.5, 0.0)]
     assert brain.senses.rejected == {"outside": 599}
-    assert encounters(brain, now + 6 * NS_PER_S) == []
+    forgotten = HAND_LAND + 1.2 / SCENARIO.limits.landing_speed + SETTLING
+    assert len(encounters(brain, now + round((forgotten - 0.1) * NS_PER_S))) == 1
+    assert encounters(brain, now + round((forgotten + 0.1) * NS_PER_S)) == []
     assert Flag.REJECTED_INPUT not in brain.step(now + 2 * NS_PER_S, FLYING, 0.0).flags
 
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from agents.company import FALL, UNHEARD_AFTER, Company, Memory, look_around
 from agents.control.modes import HAND_LAND
 from shared.clock import NS_PER_S
-from shared.messages import MOST_LOST, DroneState, Lost, Mode, Vector
+from shared.messages import MOST_LOST, ORIGIN, DroneState, Mode, Seen, Vector
 from shared.senses import Sensed
 from tests.unit.test_agent import T0, state
 
@@ -62,7 +62,7 @@ def test_a_body_is_remembered_while_it_can_be_in_the_air(memory: Memory, mode: M
         assert [gone.position for gone in company.missing] == [PLACE]
         assert company.unheard == (3,)
         assert company.lost[0][:4] == (3, T0, 7, PLACE)
-        assert not company.lost[0].down
+        assert company.lost[0].mode is mode
 
 
 @pytest.mark.parametrize(("mode", "age"), [(Mode.FOLLOW, 30.0), (Mode.STOP, FALL + 0.1), (Mode.GROUND, 0.6)])
@@ -70,7 +70,7 @@ def test_a_body_that_must_be_down_is_nobodys_obstacle_and_still_told(mode: Mode,
     company = around(2, said(1), said(3, age, mode), said(4))
     assert company.missing == []
     assert company.unheard == (3,)
-    assert company.lost[0].down
+    assert [seen.id for seen in company.lost] == [3]
     assert company.awaited == ()
 
 
@@ -90,26 +90,27 @@ def test_who_was_never_heard_is_awaited() -> None:
     assert not company.missed
 
 
+def seen(seq: int, position: Vector, age: float, mode: Mode = Mode.FOLLOW) -> Seen:
+    return Seen(3, T0, seq, position, ORIGIN, mode, age)
+
+
 def test_others_tell_where_one_was_seen_that_never_was_heard() -> None:
-    older = Lost(3, T0, 5, (0.0, 0.0, 1.0), 4.0, down=False)
-    newer = older._replace(seq=6, position=PLACE, age=3.0)
+    older, newer = seen(5, (0.0, 0.0, 1.0), 4.0), seen(6, PLACE, 3.0)
     told = around(2, said(1, unheard=(3,), lost=(older,)), said(4, unheard=(3,), lost=(newer,)))
     assert told.awaited == ()
-    assert [(gone.position, gone.age) for gone in told.missing] == [(PLACE, 3.0)]
+    assert told.missing == [newer]
     assert told.lost == (newer,)
+    assert not told.missed
 
 
-def test_one_who_doubts_that_it_is_down_is_right() -> None:
-    up = Lost(3, T0, 5, PLACE, 4.0, down=False)
-    told = around(2, said(1, unheard=(3,), lost=(up._replace(down=True),)), said(4, unheard=(3,), lost=(up,)))
-    assert told.missing
-    all_agree = around(2, *(said(n, unheard=(3,), lost=(up._replace(down=True),)) for n in (1, 4)))
-    assert not all_agree.missing
-    assert all_agree.awaited == ()
+def test_others_tell_that_one_must_be_down_that_never_was_heard() -> None:
+    for gone in (seen(5, PLACE, 60.0), seen(5, PLACE, 1.0, Mode.GROUND)):
+        told = around(2, said(1, unheard=(3,), lost=(gone,)), said(4, unheard=(3,)))
+        assert (told.missing, told.awaited) == ([], ())
 
 
 def test_nobody_is_told_where_somebody_is_whom_it_saw_itself() -> None:
-    lie = Lost(3, T0, 99, (9.0, 9.0, 9.0), 0.0, down=True)
+    lie = seen(99, (9.0, 9.0, 9.0), 0.0, Mode.GROUND)
     company = around(2, said(1, unheard=(3,), lost=(lie,)), said(3, 2.0), said(4))
     assert [gone.position for gone in company.missing] == [PLACE]
 
@@ -152,14 +153,14 @@ def test_of_many_that_are_lost_those_in_the_air_are_told() -> None:
     flying = [said(n, 3.0) for n in range(60, 64)]
     company = around(1, *landed, *flying, others=64)
     assert len(company.lost) == MOST_LOST
-    assert {seen.id for seen in company.lost} >= {60, 61, 62, 63}
+    assert {gone.id for gone in company.lost} >= {60, 61, 62, 63}
     assert company.unheard == tuple(range(2, 65))
 
 
 @given(st.lists(st.tuples(st.integers(2, 6), st.floats(0.0, 40.0), st.sampled_from(Mode)), max_size=8))
 def test_everybody_is_heard_or_missing_or_down_or_awaited(heard: list[tuple[int, float, Mode]]) -> None:
     company = around(1, *(said(*each) for each in heard), others=6)
-    down = [seen.id for seen in company.lost if seen.down]
-    everybody = [each.message.id for each in company.heard] + down + list(company.awaited)
-    assert len(everybody) + len(company.missing) == 5
+    known = [each.message.id for each in company.heard] + [gone.id for gone in company.lost]
+    assert sorted([*known, *company.awaited]) == [2, 3, 4, 5, 6]
+    assert {gone.id for gone in company.missing} <= {gone.id for gone in company.lost}
     assert sorted(company.unheard) == sorted({2, 3, 4, 5, 6} - {each.message.id for each in company.heard})

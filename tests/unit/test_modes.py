@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.control.modes import ModeInputs, ModeState, initial_mode, next_mode
+from agents.control.modes import MISSED_HOLD, MISSED_LAND, ModeInputs, ModeState, initial_mode, next_mode
 from shared.messages import Mode, Wish
 from tests.values import fields, replace
 
@@ -20,7 +20,10 @@ CALM = ModeInputs(
     battery=1.0,
     height=TAKEOFF_HEIGHT,
     takeoff_height=TAKEOFF_HEIGHT,
+    missed_for=0.0,
     references_follow=True,
+    awaiting=False,
+    alone=False,
 )
 """In the air with everything as it should be."""
 DOWN = replace(CALM, height=0.0)
@@ -84,10 +87,13 @@ def test_a_restarted_process_reads_its_pose_first(airborne: bool, mode: Mode) ->
         {"wish": Wish.HOLD},
         {"wish": Wish.LAND},
         {"wish": Wish.GROUND},
+        {"awaiting": True},
+        {"alone": True},
+        {"missed_for": 0.01},
     ],
     ids=str,
 )
-def test_take_off_is_refused_without_a_fresh_pose_a_fresh_hand_and_its_wish(missing: dict[str, Any]) -> None:
+def test_take_off_is_refused_without_pose_hand_wish_and_company(missing: dict[str, Any]) -> None:
     assert after(Mode.GROUND, height=0.0) is Mode.TAKEOFF
     assert after(Mode.GROUND, height=0.0, **missing) is Mode.GROUND
 
@@ -119,6 +125,22 @@ def test_a_drone_takes_off_before_its_references_and_waits_for_them_at_height() 
 )
 def test_a_silent_hand_means_hold_then_land(mode: Mode, age: float, then: Mode) -> None:
     assert after(mode, hand_age=age) is then
+
+
+@pytest.mark.parametrize("mode", [Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD])
+def test_whom_others_miss_holds_then_lands(mode: Mode) -> None:
+    climbing = {"height": 0.6} if mode is Mode.TAKEOFF else {}
+    assert after(mode, missed_for=MISSED_HOLD, **climbing) is (mode if climbing else Mode.FOLLOW)
+    assert after(mode, missed_for=MISSED_HOLD + 0.01, **climbing) is (mode if climbing else Mode.HOLD)
+    assert after(mode, missed_for=MISSED_LAND + 0.01, **climbing) is Mode.LAND
+    unheard = {"missed_for": MISSED_LAND + 0.01, "hand_age": NEVER, "wish": None}
+    assert after(mode, **unheard, **climbing) is Mode.LAND
+
+
+def test_a_drone_that_awaits_others_holds_and_one_that_is_alone_flies_on() -> None:
+    for mode in (Mode.FOLLOW, Mode.HOLD, Mode.TAKEOFF):
+        assert after(mode, awaiting=True) is Mode.HOLD
+        assert after(mode, alone=True) is Mode.FOLLOW
 
 
 def test_a_restarted_drone_that_has_never_heard_a_hand_holds() -> None:
@@ -162,7 +184,10 @@ any_inputs = st.builds(
     battery=st.sampled_from([0.05, 0.15, 1.0]) | st.floats(0.0, 1.0),
     height=st.sampled_from([0.0, 0.05, 0.07, 1.0, 1.15]) | st.floats(-1.0, 3.0),
     takeoff_height=st.just(TAKEOFF_HEIGHT),
+    missed_for=st.just(0.0) | ages.filter(math.isfinite),
     references_follow=st.booleans(),
+    awaiting=st.booleans(),
+    alone=st.booleans(),
 )
 
 

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.agent import FORGOTTEN_AFTER, Agent
-from agents.control.modes import CRITICAL_BATTERY, LOW_BATTERY, POSE_LOST
+from agents.agent import Agent
+from agents.company import SETTLING
+from agents.control.modes import CRITICAL_BATTERY, HAND_LAND, LOW_BATTERY, POSE_LOST
 from agents.control.repair import BLEND, REFERENCE_LOST, RETURN_AFTER, Reference, kin_order
 from agents.control.step import Output, Settings, State, step
 from agents.settings import agent_settings
@@ -171,23 +172,33 @@ def test_an_old_pose_is_told_and_a_lost_one_descends_open_loop_until_the_motors_
     assert state.mode.mode is Mode.TAKEOFF, "the operator still wants to fly, and it can see again"
 
 
-def silent_ages(seconds: list[float]) -> list[tuple[int, int]]:
+def silent_ages(seconds: list[float], *overrides: str) -> list[tuple[int, int]]:
     """Returns how many drones are avoided, and how many with a growing bubble, at some ages of drone 2."""
-    scenario = load_scenario("rhombus")
+    scenario = load_scenario("rhombus", overrides)
     formation = build_formation(scenario)
     brain = Agent(scenario, formation, 1, agent_settings(scenario, formation, 1), epoch=0)
     brain.receive({DRONE_STATE.key(id=2): [Arrival(encode(drone_state(2, seq=0)), NS_PER_S)]})
     at: Vector = (-0.5, 0.0, 1.2)
     pose = Pose(at, (0.0, 0.0, 0.0), 0.0, 1.0, True, 1)
-    found = [brain._inputs(round((1.0 + age) * NS_PER_S), pose, 0.0) for age in seconds]
+    found = []
+    for age in seconds:
+        now = round((1.0 + age) * NS_PER_S)
+        found.append(brain._inputs(now, pose, 0.0, brain._look_around(now)))
     return [(len(now.drones), len(now.silent)) for now in found]
 
 
 def test_a_silent_body_is_kept_away_from_until_it_must_be_down() -> None:
-    assert silent_ages([0.0, 0.05, 0.2, FORGOTTEN_AFTER - 0.1, FORGOTTEN_AFTER + 0.1]) == [
+    """After the ladder: 10 s without the hand, the way down, and what a landing takes longer."""
+    down = HAND_LAND + 1.2 / 0.5 + SETTLING
+    assert silent_ages([0.0, 0.05, 0.2, 5.1, down - 0.1, down + 0.1]) == [
         (1, 0),
         (1, 0),
+        (1, 1),
         (1, 1),
         (1, 1),
         (0, 0),
     ]
+
+
+def test_a_body_that_hovers_without_its_agent_is_never_forgotten() -> None:
+    assert silent_ages([1e5], "vehicles.all.link_loss=hover") == [(1, 1)]

@@ -74,6 +74,9 @@ def inputs(drone: int, **changes: Any) -> Inputs:
         references=[reference(REST[other]) for other in {1: (), 2: (1,), 3: (1,), 4: (2, 3)}[drone]],
         drones=drones(),
         silent=[],
+        missed=False,
+        awaiting=False,
+        alone=False,
     )
     now = replace(calm, **changes)
     # Drone 4 knows its ancestor, drone 1, too.
@@ -398,6 +401,9 @@ moments = st.fixed_dictionaries(
         "references": st.lists(references, min_size=3, max_size=3),
         "drones": st.lists(places, max_size=3).map(lambda found: drones(*found)),
         "silent": st.lists(st.builds(Bystander, coordinates, coordinates, st.floats(0.35, 0.6)), max_size=2),
+        "missed": st.booleans(),
+        "awaiting": st.booleans(),
+        "alone": st.booleans(),
     }
 )
 stays = st.tuples(moments, st.sampled_from([1e-9, 0.008, TICK, 0.1, 30.0]), st.integers(1, 4))
