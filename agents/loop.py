@@ -12,7 +12,8 @@ from agents.turns import Turns
 from agents.vehicles.base import Pose, Vehicle
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
-from shared.messages import DroneState, Mode
+from shared.conditions import conditions
+from shared.messages import DroneState, Flag, Mode
 from shared.process import StatusReporter
 from shared.transport import Inbox, Publish
 
@@ -22,6 +23,10 @@ LONGEST_WAIT = 0.05
 POSE_WAIT_NS = NS_PER_S // 100
 """A vehicle that has not reported yet is asked again after this long."""
 
+COMPLAINT_NS = 5 * NS_PER_S
+"""Who waits for others, or is missed by them, says so this often."""
+
+_APART = Flag.WAITING | Flag.MISSED
 _log = logging.getLogger("agent")
 
 
@@ -59,6 +64,7 @@ class Pilot:
         self._publish, self._clock = publish, clock
         self._poses = PoseWatch(vehicle)
         self._mode: Mode | None = None
+        self._complain_ns = 0
 
     def turn(self) -> int:
         """Takes in what has arrived and makes a step if one is due; returns when the next turn is due, ns."""
@@ -82,6 +88,9 @@ class Pilot:
         if state.mode is not self._mode:
             _log.info("%s at height %.2f m (%s)", state.mode, state.position[2], state.flags.name or "no flags")
             self._mode = state.mode
+        if state.flags & _APART and now_ns >= self._complain_ns:
+            self._complain_ns = now_ns + COMPLAINT_NS
+            _log.info("%s (%s)", state.mode, ", ".join(conditions(state, _APART)))
         return True
 
 

@@ -12,6 +12,7 @@ from functools import cached_property
 
 from attrs import frozen
 
+from shared.absence import without
 from shared.cells import near_pairs
 from shared.errors import ConfigError
 from shared.messages import ORIGIN, Vector
@@ -137,11 +138,12 @@ def build_formation(scenario: Scenario, origin: str = "scenario") -> Formation:
         ConfigError: Double ids, unknown references, a cycle, no path to the human, wrong weights, a `paper`
             law that is too deep, or two drones nearer than the safety distance at rest.
     """
-    drones = sorted(generate(scenario.formation), key=lambda drone: drone.id)
+    everybody = sorted(generate(scenario.formation), key=lambda drone: drone.id)
     where = f"{origin}: at key formation"
-    _check_ids(drones, scenario, where)
+    _check_ids(everybody, scenario, where)
+    drones = _present(everybody, scenario.formation.absent, where)
     ids = tuple(drone.id for drone in drones)
-    columns = {HUMAN: 0} | {str(number): column for column, number in enumerate(ids, start=1)}
+    columns = _columns(drones)
     weights = tuple(_weight_row(drone, columns, where) for drone in drones)
     offsets = tuple(_floats(drone.offset) for drone in drones)
     levels = _levels(weights, ids, where)
@@ -179,6 +181,24 @@ def _check_ids(drones: Sequence[Drone], scenario: Scenario, where: str) -> None:
 def _floats(numbers: Vector) -> Vector:
     x, y, z = map(float, numbers)
     return (x, y, z)
+
+
+def _present(drones: Sequence[Drone], absent: Sequence[int], where: str) -> Sequence[Drone]:
+    """Leaves out who stays away; the formation has to be one with them, too."""
+    if not absent:
+        return drones
+    ids = tuple(drone.id for drone in drones)
+    for number in absent:
+        if number not in ids:
+            raise ConfigError(f"{where}.absent: no drone {number} in this formation; its drones are {ids}")
+    if set(absent) == set(ids):
+        raise ConfigError(f"{where}.absent: nobody is left to fly")
+    _levels(tuple(_weight_row(drone, _columns(drones), where) for drone in drones), ids, where)
+    return without(drones, absent)
+
+
+def _columns(drones: Sequence[Drone]) -> dict[str, int]:
+    return {HUMAN: 0} | {str(drone.id): column for column, drone in enumerate(drones, start=1)}
 
 
 def _weight_row(drone: Drone, columns: Mapping[str, int], where: str) -> Weights:
@@ -271,6 +291,8 @@ def _build_links(
     for name in special:
         if name not in names:
             raise ConfigError(f"{where}: impedance.links names {name!r}, the links are {list(names)}")
+    absent = {str(number) for number in scenario.formation.absent}
+    names = tuple(name for name in names if absent.isdisjoint(name.split("-")))
     return tuple(_build_link(name, scenario.impedance, special.get(name), columns, where) for name in names)
 
 

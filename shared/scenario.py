@@ -203,6 +203,8 @@ class FormationSettings:
         columns: `grid`: drones per row; absent: near square.
         drones: The geometry of `custom`.
         links: Impedance links `"from-to"`; absent: one per reference. `[]` means none.
+        absent: Numbers of drones that stay away from this flight: nobody waits for them, and whoever refers to
+            one refers to what that one refers to.
         height_from: `paper` law: `hand` takes the height of a reference from the hand and the rest shape, as
             the recorded flights did; `references` takes its actual height, literally Eqs. 11-13, and lets the
             slow altitude loop of every drone ring through the whole formation.
@@ -215,6 +217,7 @@ class FormationSettings:
     columns: int | None = field(default=None, validator=optional(_positive))
     drones: tuple[Drone, ...] = ()
     links: tuple[str, ...] | None = None
+    absent: tuple[int, ...] = ()
     height_from: Literal["hand", "references"] = "hand"
 
 

@@ -15,7 +15,8 @@ from deploy.launcher.flight import Flight
 from deploy.launcher.glove_panel import GlovePanel
 from deploy.launcher.job_control import in_foreground
 from deploy.launcher.monitor import Monitor
-from shared.messages import DroneState, Flag, ProcessStatus
+from shared.conditions import conditions
+from shared.messages import DroneState, ProcessStatus
 from shared.nodes import DRONE
 
 LIVE_PERIOD_S = 0.5
@@ -193,7 +194,7 @@ def _cells(row: AgentRow) -> tuple[str, ...]:
     """The cells after the id; `-` where nothing is known yet."""
     state, status = row.state, row.status
     flags = [] if row.alive else ["absent"]
-    flags += [flag.name.lower() for flag in Flag if state and flag in state.flags and flag.name]
+    flags += conditions(state) if state else []
     return (
         state.mode.value if state else "-",
         f"{state.position[2]:.2f} m" if state else "-",
@@ -203,7 +204,7 @@ def _cells(row: AgentRow) -> tuple[str, ...]:
         str(row.rejected),
         str(row.restarts),
         f"{status.cpu:.0%}" if status else "-",
-        " ".join(flags),
+        ", ".join(flags),
     )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable
 
 from attrs import frozen
 
+from shared.conditions import conditions
 from shared.messages import DroneState, Flag, ProcessStatus
 from shared.net.audit import LINKED, REFUSED
 from shared.nodes import DRONE, RELAY, WORLD
@@ -18,6 +19,8 @@ WORRYING = (
     | Flag.OLD_POSE
     | Flag.HAND_STALE
     | Flag.REJECTED_INPUT
+    | Flag.WAITING
+    | Flag.MISSED
 )
 
 
@@ -95,11 +98,7 @@ def judge(token: str, heard: Heard) -> Row:
     if token.startswith(f"{DRONE}/") and heard.state is None:
         problems.append("sends no state")
     if heard.state is not None:
-        problems += [
-            flag.name.lower().replace("_", " ")
-            for flag in Flag
-            if flag & WORRYING & heard.state.flags and flag.name
-        ]
+        problems += conditions(heard.state, WORRYING)
     return Row(token=token, heard=heard, problems=tuple(problems))
 
 

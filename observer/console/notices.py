@@ -12,6 +12,7 @@ _FLAGS = (
     (Flag.BLOCKED, "warning", "blocked: does not reach its goal"),
     (Flag.LOW_BATTERY, "warning", "battery low"),
     (Flag.OLD_POSE, "warning", "does not know where it is: its pose is old"),
+    (Flag.MISSED, "alarm", "is not heard by others, or does not hear them: it holds, then lands"),
     (Flag.REJECTED_INPUT, "warning", "does not believe what it hears: who says so is in its log"),
 )
 
@@ -39,7 +40,18 @@ def notices(states: Mapping[int, DroneState], missing: Collection[int], *, hand_
         flagged = [i for i, state in sorted(states.items()) if flag in state.flags and i not in missing]
         if flagged:
             found.append(_notice(level, f"{_drones(flagged)} {text}"))
+    found += _waiting(states, missing)
     return sorted(found, key=lambda notice: notice["level"] != "alarm")
+
+
+def _waiting(states: Mapping[int, DroneState], missing: Collection[int]) -> list[Json]:
+    """Says for whom drones wait, which do not know where everybody is whom they must avoid."""
+    waiting = {i: s for i, s in sorted(states.items()) if Flag.WAITING in s.flags and i not in missing}
+    awaited = sorted({other for state in waiting.values() for other in state.unheard})
+    if not awaited:
+        return []
+    verb = "wait" if len(waiting) > 1 else "waits"
+    return [_notice("warning", f"{_drones([*waiting])} {verb} until {_drones(awaited)} is heard")]
 
 
 def _drones(ids: list[int]) -> str:

@@ -8,7 +8,7 @@ from shared.codec import MAX_PAYLOAD, encode
 from shared.config import vehicle_settings
 from shared.formation import Formation, Link
 from shared.messages import MAX_POSITION, MOST_LOST, DroneState, Heard, Mode, Seen, Vector
-from shared.nodes import all_nodes
+from shared.nodes import all_nodes, drone_node
 from shared.scenario import MAX_PORT, Scenario
 from shared.scenario_check.finding import Finding
 from shared.topics import DRONE_STATE, HAND
@@ -58,13 +58,14 @@ def largest_displacement(link: Link, speed: float) -> float:
 
 
 def _nodes(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
-    known = all_nodes(formation)
-    if scenario.net.base_port + len(known) > MAX_PORT + 1:
+    nodes = all_nodes(formation)
+    if scenario.net.base_port + len(nodes) > MAX_PORT + 1:
         yield Finding(
             "net.base_port",
-            f"{scenario.net.base_port} leaves no ports for {len(known)} nodes",
-            f"{MAX_PORT + 1 - len(known)} is the last that does",
+            f"{scenario.net.base_port} leaves no ports for {len(nodes)} nodes",
+            f"{MAX_PORT + 1 - len(nodes)} is the last that does",
         )
+    known = (*nodes, *map(drone_node, scenario.formation.absent))
     for node in scenario.net.endpoints:
         if node not in known:
             yield Finding(

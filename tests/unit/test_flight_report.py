@@ -131,7 +131,7 @@ def test_the_live_table_shows_every_agent_within_80_columns() -> None:
     assert all(len(line) <= 80 for line in lines)
     assert "FOLLOW 1.23 m     0.30 m       - 60 Hz        0        0 20%" in text
     assert "12.3 ms" in text
-    assert "fence hand_stale" in " ".join(text.split())
+    assert "fence, hand stale" in " ".join(text.split())
     assert "absent" in text
 
 
@@ -148,7 +148,7 @@ def test_a_large_swarm_is_summarised_and_its_unhealthy_agents_listed() -> None:
 def test_plain_lines_are_name_and_line() -> None:
     (line,) = plain_lines([ill(2)])
     assert line.startswith("drone 2 | mode HOLD, height 1.23 m, goal error 0.30 m, latency 12.3 ms")
-    assert line.endswith("flags fence hand_stale")
+    assert line.endswith("flags fence, hand stale")
 
 
 @pytest.mark.parametrize(
