@@ -7,8 +7,9 @@ ever compares the clocks of two processes (DESIGN section 3).
 
 import time
 from collections.abc import Callable
+from typing import Final
 
-NS_PER_S = 1_000_000_000
+NS_PER_S: Final = 1_000_000_000
 
 Clock = Callable[[], int]
 """Returns the source clock in nanoseconds since the epoch."""

@@ -1,11 +1,13 @@
 """Which of two samples of a publisher is the newer, by (epoch, seq) and the time that passed here. Pure."""
 
+from typing import Final
+
 from shared.clock import NS_PER_S
 from shared.errors import DecodeError
 
-FASTEST_HZ = 1000
+FASTEST_HZ: Final = 1000
 """Nobody publishes more often on one key ..."""
-AT_ONCE = 256
+AT_ONCE: Final = 256
 """... but what was held up comes together, and clocks drift."""
 
 AHEAD, LATE = "ahead", "out-of-order"

@@ -9,13 +9,13 @@ spent by moving, so many small jumps get nobody further than one large one. Stam
 """
 
 import math
-
-from msgspec import Struct
+from typing import Final, final
 
 from shared.clock import NS_PER_S
 from shared.errors import DecodeError
 from shared.messages import Vector
 
+NOWHERE: Vector = (-math.inf, -math.inf, -math.inf)
 UNBOUNDED: Vector = (math.inf, math.inf, math.inf)
 
 BODY_SPEED, FALL_SPEED = 5.0, 10.0
@@ -26,7 +26,8 @@ BEYOND_FENCE = 2.0
 """How far out of the fence a body may get, m: it may be pushed, carried or badly tracked."""
 
 
-class MotionLimits(Struct, frozen=True, kw_only=True):
+@final
+class MotionLimits:
     """What is possible.
 
     Attributes:
@@ -37,11 +38,20 @@ class MotionLimits(Struct, frozen=True, kw_only=True):
         high: Upper corner, m.
     """
 
-    speed: float
-    vertical_speed: float
-    slack: float
-    low: Vector = (-math.inf, -math.inf, -math.inf)
-    high: Vector = UNBOUNDED
+    def __init__(
+        self,
+        *,
+        speed: float,
+        vertical_speed: float,
+        slack: float,
+        low: Vector = NOWHERE,
+        high: Vector = UNBOUNDED,
+    ) -> None:
+        self.speed: Final = speed
+        self.vertical_speed: Final = vertical_speed
+        self.slack: Final = slack
+        self.low: Final = low
+        self.high: Final = high
 
 
 HAND_LIMITS = MotionLimits(speed=10.0, vertical_speed=10.0, slack=0.3)
@@ -66,7 +76,8 @@ def body_limits(low: Vector, high: Vector, fastest: float) -> MotionLimits:
     )
 
 
-class Believed(Struct, frozen=True):
+@final
+class Believed:
     """What was believed last.
 
     Attributes:
@@ -75,9 +86,10 @@ class Believed(Struct, frozen=True):
         reach: What is left of the slack, m.
     """
 
-    position: Vector
-    at_ns: int
-    reach: float
+    def __init__(self, position: Vector, at_ns: int, reach: float) -> None:
+        self.position: Final = position
+        self.at_ns: Final = at_ns
+        self.reach: Final = reach
 
 
 def check_possible(position: Vector, velocity: Vector, limits: MotionLimits) -> None:
@@ -92,13 +104,14 @@ def check_possible(position: Vector, velocity: Vector, limits: MotionLimits) -> 
         DecodeError: `outside` (the place) or `too-fast` (the velocity).
     """
     x, y, z = position
-    (a, b, c), (d, e, f) = limits.low, limits.high
+    a, b, c = limits.low
+    d, e, f = limits.high
     if not (a <= x <= d and b <= y <= e and c <= z <= f):
         raise DecodeError(
             "outside", f"at {_said(position)} m, not within {_said(limits.low)} to {_said(limits.high)}"
         )
     u, v, w = velocity
-    if not math.hypot(u, v, w * limits.speed / limits.vertical_speed) <= limits.speed:
+    if not _length(u, v, w * limits.speed / limits.vertical_speed) <= limits.speed:
         raise DecodeError("too-fast", f"{_said(velocity)} m/s")
 
 
@@ -124,8 +137,9 @@ def believe(
     check_possible(position, velocity, limits)
     if known is None:
         return Believed(position, at_ns, limits.slack)
-    (x, y, z), (p, q, r) = position, known.position
-    way = math.hypot(x - p, y - q, (z - r) * limits.speed / limits.vertical_speed)
+    x, y, z = position
+    p, q, r = known.position
+    way = _length(x - p, y - q, (z - r) * limits.speed / limits.vertical_speed)
     passed = at_ns - known.at_ns
     reach = known.reach + limits.speed * passed / NS_PER_S if passed > 0 else known.reach
     if not way <= reach:
@@ -133,6 +147,10 @@ def believe(
             "jump", f"from {_said(known.position)} to {_said(position)} m within {passed / NS_PER_S:.3f} s"
         )
     return Believed(position, at_ns, min(reach - way, limits.slack))
+
+
+def _length(x: float, y: float, z: float) -> float:
+    return math.sqrt(x * x + y * y + z * z)
 
 
 def _said(vector: Vector) -> str:

@@ -3,9 +3,8 @@
 import logging
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar, final
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from shared.clock import NS_PER_S
@@ -26,11 +25,13 @@ _LOG_PERIOD_NS = 5 * NS_PER_S
 _log = logging.getLogger("senses")
 
 
-class Sensed(Struct, Generic[M], frozen=True):
+@final
+class Sensed(Generic[M]):
     """One message and when it arrived (own clock, ns)."""
 
-    message: M
-    arrival_ns: int
+    def __init__(self, message: M, arrival_ns: int) -> None:
+        self.message: Final = message
+        self.arrival_ns: Final = arrival_ns
 
     @property
     def heard(self) -> Heard:
@@ -42,6 +43,7 @@ class Sensed(Struct, Generic[M], frozen=True):
         return (now_ns - self.arrival_ns) / NS_PER_S
 
 
+@final
 class Senses:
     """Newest valid hand sample and drone states of one listener.
 

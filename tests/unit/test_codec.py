@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
-from shared.codec import MAX_PAYLOAD, decode, decode_strictly, decode_valid, encode
+from shared.codec import MAX_PAYLOAD, decode, decode_valid, encode
 from shared.config import load_scenario
 from shared.errors import DecodeError
 from shared.formation import build_formation
@@ -26,6 +26,7 @@ from shared.messages import (
     ProcessStatus,
     Wish,
 )
+from shared.strict_codec import decode_strictly
 from shared.topics import DRONE_STATE, HAND
 from tests.strategies import MESSAGES, TREES, fields_of, garbage, mutations, refusal
 
@@ -79,6 +80,21 @@ def test_every_message_survives_the_wire_exactly(data: st.DataObject, kind: type
     assert type(decoded) is kind
     assert encode(decoded) == payload
     assert payload == msgpack.packb({"v": SCHEMA_VERSION, **structs.asdict(message)})
+
+
+@pytest.mark.parametrize(("first", "last"), [(1, 2), (2, 2), (None, 2), (2, None), (None, None)])
+def test_a_version_is_there_and_right_wherever_it_is(first: int | None, last: int | None) -> None:
+    fields = msgpack.packb(structs.asdict(HAND_SAMPLE))
+    said = [b"" if v is None else msgpack.packb("v") + msgpack.packb(v) for v in (first, last)]
+    count = len(structs.asdict(HAND_SAMPLE)) + sum(map(bool, said))
+    with pytest.raises(DecodeError) as refused:
+        decode(bytes([0x80 | count]) + said[0] + fields[1:] + said[1], HandSample)
+    assert refused.value.reason == "version"
+
+
+def test_a_version_may_come_last() -> None:
+    fields = {**structs.asdict(HAND_SAMPLE), "v": SCHEMA_VERSION}
+    assert decode(msgpack.packb(fields), HandSample) == HAND_SAMPLE
 
 
 @given(data=st.data(), kind=KINDS)
