@@ -176,7 +176,8 @@ class Bridge:
 
     def _cue_requests(self, now_ns: int) -> list[tuple[Cue, Request]]:
         hand = self.senses.hand
-        hand_stale = hand is not None and hand.age(now_ns) > HAND.stale_s
+        # A hand that has jumped is not followed, as one that is silent is not: it feels the same.
+        hand_stale = hand is not None and (hand.age(now_ns) > HAND.stale_s or hand.message.jumped)
         states = {drone: sensed.message for drone, sensed in self.senses.drones.items()}
         cues = active_cues(states, self.missing, hand_stale=hand_stale)
         return [(cue, self._request(self._cues.patterns[cue.pattern], self._cue_heard(cue))) for cue in cues]

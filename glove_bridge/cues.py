@@ -38,7 +38,7 @@ def active_cues(
     Args:
         states: The last state of every drone that was ever heard, also of those that are missing now.
         missing: Drones of the formation that are not heard.
-        hand_stale: Whether the hand has fallen silent.
+        hand_stale: Whether the hand has fallen silent, or jumped.
 
     Returns:
         Nothing while, as far as is known, every drone is on the ground.

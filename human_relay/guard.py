@@ -81,7 +81,8 @@ def _follows(last: HandPose, pose: HandPose) -> bool:
 
 
 def _rest(passed: HandPose, pose: HandPose) -> HandPose:
-    return evolve(passed, t_ns=pose.t_ns)
+    """Returns the hand where it was; what the source wishes counts all the same."""
+    return evolve(passed, mode=pose.mode, t_ns=pose.t_ns)
 
 
 def _walk(passed: HandPose, pose: HandPose) -> HandPose:
@@ -93,4 +94,4 @@ def _walk(passed: HandPose, pose: HandPose) -> HandPose:
     share = reach / way
     (x, y, z), (a, b, c) = passed.position, pose.position
     place: Vector = (x + share * (a - x), y + share * (b - y), z + share * (c - z))
-    return evolve(passed, position=place, t_ns=pose.t_ns)
+    return evolve(passed, position=place, mode=pose.mode, t_ns=pose.t_ns)

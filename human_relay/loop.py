@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from msgspec.structs import replace
 
-from human_relay.relay import IMPOSSIBLE_POSE, RelayState, due_ns, make_sample, order
+from human_relay.relay import HAND_JUMP, IMPOSSIBLE_POSE, RelayState, due_ns, make_sample, order
 from human_relay.sources.base import HandPose, HandSource
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
@@ -56,7 +56,8 @@ def run(
 
     def report(word: str, *, force: bool = False) -> None:
         metrics = {"samples": float(state.seq)}
-        status.tick(state.seq, word, {IMPOSSIBLE_POSE: state.rejected}, lambda: metrics, force=force)
+        counts = {IMPOSSIBLE_POSE: state.rejected, HAND_JUMP: state.guard.jumps}
+        status.tick(state.seq, word, counts, lambda: metrics, force=force)
 
     while not stopping.is_set():
         now = clock()
@@ -66,7 +67,7 @@ def run(
         if ordered or now >= due_ns(state, offered):
             state, sample = make_sample(state, offered, now, finished=source.finished)
             if offered and state.rejected > rejected and now >= complain_ns:
-                _complain(offered, state.rejected)
+                _complain(offered, state)
                 complain_ns = now + _LOG_PERIOD_NS
             rejected = state.rejected
             publish(sign(encode(replace(sample, signature=blank()))) if sign else encode(sample))
@@ -76,6 +77,10 @@ def run(
     report("ending", force=True)
 
 
-def _complain(offered: HandPose, count: int) -> None:
+def _complain(offered: HandPose, state: RelayState) -> None:
     place = ", ".join(f"{x:g}" for x in offered.position)
-    _log.warning("no hand can be at (%s) m and have come there; in metres? (so far %d)", place, count)
+    if state.guard.jumped:
+        what = f"the hand cannot have come to ({place}) m: it holds until it moves like a hand again"
+    else:
+        what = f"no hand can be at ({place}) m"
+    _log.warning("%s; in metres? (so far %d jumps, %d poses)", what, state.guard.jumps, state.rejected)

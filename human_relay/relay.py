@@ -4,13 +4,13 @@ Pure: the state is passed in and returned, and so is the time. The wish in a sam
 source's, the operator's and the relay's own, with STOP > LAND > HOLD > whatever the source says.
 """
 
-import math
 from typing import NamedTuple
 
+from human_relay.guard import GuardState, guard
 from human_relay.sources.base import HandPose
 from human_relay.velocity import VelocityState, step
 from shared.clock import NS_PER_S
-from shared.messages import MAX_POSITION, MAX_VELOCITY, NO_HAND, ORIGIN, HandSample, Vector, Wish
+from shared.messages import MAX_POSITION, NO_HAND, ORIGIN, HandSample, Vector, Wish
 from shared.topics import HAND
 
 PERIOD_NS = round(NS_PER_S / HAND.rate_hz)
@@ -24,6 +24,8 @@ STALE_NS = NS_PER_S // 10
 MAX_YAW = 1_000.0
 """Largest yaw that receivers accept, rad."""
 
+HAND_JUMP = "hand-jump"
+"""By this reason the relay's status counts how often the hand has jumped."""
 IMPOSSIBLE_POSE = "impossible-pose"
 """By this reason the relay's status counts the poses of its source that it has refused."""
 
@@ -37,12 +39,13 @@ class RelayState(NamedTuple):
         epoch: Start of the process, ns.
         seq: Number of the next sample, which is also the number of samples so far.
         override: What the operator ordered; None leaves the wish to the source.
-        pose: Last good pose; None until the first.
+        pose: Last pose that was passed on; None until the first.
+        guard: Whether the hand can have moved as its source says.
         velocity: Hand velocity at that pose, m/s.
         estimator: State of the velocity estimator.
         fresh_ns: When the last new pose was sent.
         sent_ns: When the last sample was sent.
-        rejected: Samples in which the source's pose was replaced because it was impossible.
+        rejected: Poses of the source that were replaced: impossible, or of a hand that has jumped.
         period_ns: Between two samples, if the source has so many poses or more (`rates.hand_hz`).
         next_ns: When the next pose is due if the source has more; on average, not for each.
         judged_ns: `t_ns` of the last pose that was offered, be it impossible.
@@ -52,6 +55,7 @@ class RelayState(NamedTuple):
     seq: int = 0
     override: Wish | None = None
     pose: HandPose | None = None
+    guard: GuardState = GuardState()
     velocity: Vector = ORIGIN
     estimator: VelocityState = VelocityState()
     fresh_ns: int = 0
@@ -115,7 +119,8 @@ def make_sample(
     """Makes the next sample.
 
     Without a usable pose (released, not armed yet, impossible) the sample is the last good pose at rest with
-    the wish HOLD; before the first pose it says `NO_HAND`.
+    the wish HOLD; before the first pose it says `NO_HAND`. Of a hand that has jumped the wish counts, but for
+    FLY, and the motion does not (`guard.py`).
 
     Args:
         state: The relay.
@@ -126,9 +131,9 @@ def make_sample(
     Returns:
         The new state and the sample.
     """
-    if offered is not None and _is_possible(state, offered):
+    if offered is not None and _is_possible(offered):
         state = _take(state, offered, now_ns)
-        wish = offered.mode
+        wish = _strongest(offered.mode, Wish.HOLD if state.guard.jumped else None)
     else:
         impossible = offered is not None
         state = state._replace(velocity=ORIGIN, estimator=VelocityState(), rejected=state.rejected + impossible)
@@ -143,6 +148,7 @@ def make_sample(
         velocity=state.velocity,
         yaw=pose.yaw if pose else 0.0,
         mode=wish,
+        jumped=state.guard.jumped,
     )
     # A STOP is final wherever it came from.
     override = Wish.STOP if wish is Wish.STOP else state.override
@@ -156,21 +162,25 @@ def _take(state: RelayState, offered: HandPose, now_ns: int) -> RelayState:
     if not has_news(state, offered):
         is_stale = now_ns - offered.t_ns > STALE_NS
         return state._replace(velocity=ORIGIN) if is_stale else state
+    guarded = guard(state.guard, offered)
+    pose = guarded.passed or offered
     dt = (offered.t_ns - state.pose.t_ns) / NS_PER_S if state.pose else 0.0
-    estimator, velocity = step(state.estimator, offered.position, dt)
-    next_ns = max(state.next_ns, now_ns) + state.period_ns
+    rests = guarded.jumped and state.pose is not None and pose.position == state.pose.position
+    estimator, velocity = step(VelocityState() if rests else state.estimator, pose.position, dt)
     return state._replace(
-        pose=offered, velocity=velocity, estimator=estimator, fresh_ns=now_ns, next_ns=next_ns
+        pose=pose,
+        guard=guarded,
+        rejected=state.rejected + guarded.jumped,
+        velocity=velocity,
+        estimator=estimator,
+        fresh_ns=now_ns,
+        next_ns=max(state.next_ns, now_ns) + state.period_ns,
     )
 
 
-def _is_possible(state: RelayState, offered: HandPose) -> bool:
-    """Whether receivers would accept the pose and a hand could have come there from the last good one."""
-    within = all(abs(x) <= MAX_POSITION for x in offered.position) and abs(offered.yaw) <= MAX_YAW
-    if not within or state.pose is None or not has_news(state, offered):
-        return within
-    way = math.dist(offered.position, state.pose.position)
-    return way <= MAX_VELOCITY * (offered.t_ns - state.pose.t_ns) / NS_PER_S
+def _is_possible(offered: HandPose) -> bool:
+    """Whether receivers would accept the pose."""
+    return all(abs(x) <= MAX_POSITION for x in offered.position) and abs(offered.yaw) <= MAX_YAW
 
 
 def _strongest(*wishes: Wish | None) -> Wish:

@@ -128,6 +128,8 @@ class HandSample(Message, frozen=True, kw_only=True):
         velocity: Hand in the world frame, m/s.
         yaw: Heading of the hand about z, rad.
         mode: The operator's wish.
+        jumped: The source says that the hand is where no hand can have come: it is kept where it was believed
+            last, and holds.
         signature: Ed25519 signature over key, epoch, seq and payload; None where the swarm has no key.
     """
 
@@ -135,6 +137,7 @@ class HandSample(Message, frozen=True, kw_only=True):
     velocity: Velocity
     yaw: Angle
     mode: Wish
+    jumped: bool = False
     signature: bytes | None = None
 
 

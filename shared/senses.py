@@ -170,6 +170,7 @@ class Senses:
             velocity=ORIGIN,
             yaw=sample.yaw if known is None else known.message.yaw,
             mode=Wish.HOLD if sample.mode is Wish.FLY else sample.mode,
+            jumped=True,
         )
 
     def _reject(self, key: str, error: DecodeError, now_ns: int) -> None:

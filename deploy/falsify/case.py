@@ -6,7 +6,7 @@ from attrs import frozen
 
 from shared.scenario import Triple
 
-FaultKind = Literal["cut", "mute", "deaf", "kill", "held", "blind", "empty", "relay"]
+FaultKind = Literal["cut", "mute", "deaf", "kill", "held", "blind", "empty", "relay", "glitch"]
 """What fails, see `Fault`."""
 
 Order = Literal["FLY", "HOLD", "LAND"]
@@ -43,6 +43,7 @@ class Fault:
     | `blind` | its vehicle's pose does not come |
     | `empty` | its battery is critical |
     | `relay` | nobody hears the hand; `drone` is 0 |
+    | `glitch` | the tracker takes the place of the drone at rest for that of the hand |
 
     Attributes:
         kind: What.

@@ -143,7 +143,7 @@ def _draw_strokes(place: Vector, room: Room, seconds: float, rng: Rng) -> tuple[
 
 
 def draw_faults(formation: Formation, seconds: float, rng: Rng) -> tuple[Fault, ...]:
-    """Draws what fails: mostly one drone in one way, sometimes the relay as well."""
+    """Draws what fails: mostly one drone in one way, sometimes relay or tracker as well."""
     faults = []
     if rng.random() < 0.75:
         kind = _ONE_DRONE[int(rng.integers(len(_ONE_DRONE)))]
@@ -154,6 +154,10 @@ def draw_faults(formation: Formation, seconds: float, rng: Rng) -> tuple[Fault, 
     if rng.random() < 0.15:
         start = float(rng.uniform(0.0, seconds))
         faults.append(Fault(kind="relay", start=start, end=start + float(rng.exponential(2.0))))
+    if rng.random() < 0.1:
+        start = float(rng.uniform(0.0, seconds))
+        drone = formation.ids[int(rng.integers(len(formation.ids)))]
+        faults.append(Fault(kind="glitch", drone=drone, start=start, end=start + float(rng.exponential(0.5))))
     return tuple(faults)
 
 

@@ -6,12 +6,15 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from deploy.falsify.case import Case, Stroke
+from attrs import evolve
+
+from deploy.falsify.case import Case, Fault, Stroke
 from deploy.lockstep.ticks import tick_ns
 from human_relay.relay import RelayState, make_sample, order
 from human_relay.sources.base import HandPose
 from human_relay.sources.scripted import MINIMUM_JERK_PEAK, minimum_jerk
 from shared.clock import NS_PER_S
+from shared.formation import Formation
 from shared.messages import HandSample, Vector, Wish
 
 TURN_RATE = 2.0
@@ -55,8 +58,26 @@ def _places(case: Case, times: list[float]) -> Iterator[tuple[Vector, float]]:
         )
 
 
+def tracked(case: Case, hand: list[HandPose], formation: Formation) -> list[HandPose]:
+    """Returns where the tracker takes the hand to be at every tick."""
+    shifts = [(fault, formation.rest[formation.row(fault.drone)]) for fault in _glitches(case)]
+    return [_shifted(pose, shifts) for pose in hand] if shifts else hand
+
+
+def _glitches(case: Case) -> list[Fault]:
+    return [fault for fault in case.faults if fault.kind == "glitch"]
+
+
+def _shifted(pose: HandPose, shifts: list[tuple[Fault, Vector]]) -> HandPose:
+    for fault, (dx, dy, dz) in shifts:
+        if fault.on(pose.t_ns / NS_PER_S):
+            x, y, z = pose.position
+            pose = evolve(pose, position=(x + dx, y + dy, z + dz))
+    return pose
+
+
 def samples(case: Case, hand: list[HandPose]) -> list[HandSample]:
-    """Returns what the relay says at every tick of a hand."""
+    """Returns what the relay says at every tick of a tracked hand."""
     state, said = RelayState(epoch=0), []
     wishes = iter(sorted(case.wishes, key=lambda each: each.t))
     wish = next(wishes, None)

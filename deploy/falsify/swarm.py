@@ -15,7 +15,7 @@ from agents.vehicles.bodies.link_loss import obeyed
 from agents.vehicles.bodies.state import CUT, DESCEND, FLY, IDLE
 from deploy.falsify.air import Air
 from deploy.falsify.case import Case, FaultKind
-from deploy.falsify.hand import poses, samples
+from deploy.falsify.hand import poses, samples, tracked
 from deploy.lockstep.start import EPOCH, introduce, rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.arrays import Vec
@@ -70,7 +70,7 @@ def fly(case: Case) -> Flown:
     scenario, formation = prepare(case.scenario, case.overrides)
     rate = scenario.rates.control_hz
     hand = poses(case, rate)
-    said = samples(case, hand)
+    said = samples(case, tracked(case, hand, formation))
     swarm = Swarm(case, scenario, formation, _start(case, scenario, formation, said[0]))
     rows = [swarm.advance(sample) for sample in said]
     columns = [np.array(column) for column in zip(*rows, strict=True)]

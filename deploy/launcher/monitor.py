@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from human_relay.relay import IMPOSSIBLE_POSE
+from human_relay.relay import HAND_JUMP, IMPOSSIBLE_POSE
 from observer.flight_stats import FlightStats
 from observer.glove_log import GloveLog
 from shared.clock import Clock
@@ -75,8 +75,16 @@ class Monitor:
     @property
     def rejected_poses(self) -> int:
         """How many poses of the hand the relay has refused as impossible."""
+        return self._refused(IMPOSSIBLE_POSE)
+
+    @property
+    def hand_jumps(self) -> int:
+        """How often the hand has jumped."""
+        return self._refused(HAND_JUMP)
+
+    def _refused(self, reason: str) -> int:
         health = self.health.get(f"{RELAY}/0")
-        return health.rejected[IMPOSSIBLE_POSE] if health else 0
+        return health.rejected[reason] if health else 0
 
     @property
     def all_down(self) -> bool:

@@ -38,15 +38,20 @@ def flight_summary(
         `min_distance_m`, `min_hand_distance_m`, `collisions`, `fence_exits` (null without a simulated world),
         `agents` with `id, steps, rate_hz, on_time, hand_used, tracking_rms_m, latency_ms {p50, p99}, cpu,
         rss_mb` each; and beyond the contract `faults` (sentences), `hand` (`asked`: whether it ever asked to
-        fly; `rejected`: how many of its poses were impossible; `remarks`), `landed`, `formation`, `glove`
-        (null without one: `uri`, `patterns`; `played`, `delivered`, `suppressed`, `failed` and `lost` by
-        pattern; `latency_ms` from the drone state to the first frame) and, per agent, `followed`,
+        fly; `rejected`: how many of its poses were impossible; `jumps`; `remarks`), `landed`, `formation`,
+        `glove` (null without one: `uri`, `patterns`; `played`, `delivered`, `suppressed`, `failed` and `lost`
+        by pattern; `latency_ms` from the drone state to the first frame) and, per agent, `followed`,
         `lateness_ms`, `missed`, `rejected` (by reason) and `restarts`.
     """
     referee = outcome.referee
     formation = attrs.asdict(monitor.stats.formation())
     agents = [_agent(agent, outcome, monitor) for agent in monitor.stats.agents()]
-    hand = {"asked": monitor.asked, "rejected": monitor.rejected_poses, "remarks": list(remarks)}
+    hand = {
+        "asked": monitor.asked,
+        "rejected": monitor.rejected_poses,
+        "jumps": monitor.hand_jumps,
+        "remarks": list(remarks),
+    }
     faults = _faults(outcome, {agent["id"]: agent["followed"] for agent in agents}, hand)
     return {
         "ok": not faults,
@@ -170,6 +175,7 @@ def _flight_table(summary: Json) -> Table:
     table = _table("flight", "", "")
     table.add_row("the hand asked to fly", "yes" if summary["hand"]["asked"] else "no")
     table.add_row("its poses that were impossible", str(summary["hand"]["rejected"]))
+    table.add_row("how often it jumped", str(summary["hand"]["jumps"]))
     table.add_row("smallest distance between drones, m", _number(summary["min_distance_m"]))
     table.add_row("smallest distance to the hand, m", _number(summary["min_hand_distance_m"]))
     table.add_row("collisions", _number(summary["collisions"], 0))

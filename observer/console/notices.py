@@ -17,13 +17,16 @@ _FLAGS = (
 )
 
 
-def notices(states: Mapping[int, DroneState], missing: Collection[int], *, hand_silent: bool) -> list[Json]:
+def notices(
+    states: Mapping[int, DroneState], missing: Collection[int], *, hand_silent: bool, hand_jumped: bool = False
+) -> list[Json]:
     """Lists the conditions that hold now.
 
     Args:
         states: The last state of every drone that was ever heard.
         missing: Drones of those that are not heard any more.
         hand_silent: Whether the relay has fallen silent.
+        hand_jumped: Whether the hand is said to be where no hand can have come.
 
     Returns:
         `{level, text}` each; nothing about the hand while everybody is on the ground.
@@ -34,8 +37,11 @@ def notices(states: Mapping[int, DroneState], missing: Collection[int], *, hand_
         if state.mode is Mode.STOP
     ]
     found += [_notice("alarm", f"{_drones([drone])} is lost") for drone in sorted(missing)]
-    if hand_silent and any(state.mode in _AIRBORNE for state in states.values()):
-        found.append(_notice("alarm", "the hand is silent: the swarm holds, then lands"))
+    if any(state.mode in _AIRBORNE for state in states.values()):
+        if hand_silent:
+            found.append(_notice("alarm", "the hand is silent: the swarm holds, then lands"))
+        elif hand_jumped:
+            found.append(_notice("alarm", "the hand jumped: the swarm holds until it moves like a hand again"))
     for flag, level, text in _FLAGS:
         flagged = [i for i, state in sorted(states.items()) if flag in state.flags and i not in missing]
         if flagged:
@@ -51,7 +57,7 @@ def _waiting(states: Mapping[int, DroneState], missing: Collection[int]) -> list
     if not awaited:
         return []
     verb = "wait" if len(waiting) > 1 else "waits"
-    return [_notice("warning", f"{_drones([*waiting])} {verb} until {_drones(awaited)} is heard")]
+    return [_notice("warning", f"{_drones([*waiting])} {verb} to hear {_drones(awaited)}")]
 
 
 def _drones(ids: list[int]) -> str:

@@ -129,7 +129,9 @@ class SwarmView:
         missing = [i for i, sensed in drones.items() if sensed.age(now_ns) > DRONE_STATE.stale_s]
         states = {i: sensed.message for i, sensed in drones.items()}
         silent = hand is not None and hand.age(now_ns) > HAND.stale_s
-        return {"type": "notices", "notices": notices(states, missing, hand_silent=silent)}
+        jumped = hand is not None and hand.message.jumped
+        found = notices(states, missing, hand_silent=silent, hand_jumped=jumped)
+        return {"type": "notices", "notices": found}
 
     def health(self, now_ns: int) -> Json:
         """Returns the `health` message."""

@@ -16,6 +16,7 @@ from shared.config import load_scenario
 from shared.errors import ConfigError
 from shared.formation import build_formation
 from shared.messages import ORIGIN, DroneState, HandSample, Heard, Mode, Vector, Wish
+from shared.senses import Sensed
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 from tests.strategies import garbage
@@ -181,6 +182,16 @@ def test_a_silent_hand_is_felt_before_the_formation() -> None:
             assert 250 < (now - START) / MS < 250 + 17
             return
     raise AssertionError("nothing was felt")
+
+
+def test_a_hand_that_has_jumped_is_felt_as_one_that_is_silent() -> None:
+    bridge = make()
+    hear(bridge, START)
+    bridge.step(START)
+    hand = bridge.senses.hand
+    assert hand is not None
+    bridge.senses.hand = Sensed(replace(hand.message, jumped=True), START)
+    assert played(bridge.step(START + 500 * MS)) == "HAND_STALE"
 
 
 def test_states_of_different_age_do_not_deform_a_moving_formation() -> None:

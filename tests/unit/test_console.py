@@ -5,8 +5,10 @@ import json
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from observer.console.console import Console
+from observer.console.notices import notices
 from observer.console.page_link import MOST_EVENTS, PageLink
 from observer.console.pattern_file import read_patterns
 from observer.console.scene import CLEARANCE, HandMap, scene
@@ -257,6 +259,22 @@ def test_notices_and_health_come_when_something_changes() -> None:
     assert told["notices"]["notices"][0] == {"level": "alarm", "text": "drone 1 is lost"}
     assert told["health"]["processes"][0]["cpu"] == 0.05
     assert told["health"]["processes"][0]["present"] is False
+
+
+def test_a_hand_that_has_jumped_is_told_while_somebody_flies() -> None:
+    said = [notices({1: Stage().drone(mode=mode)}, (), hand_silent=False, hand_jumped=True) for mode in Mode]
+    texts = {mode: [notice["text"] for notice in found] for mode, found in zip(Mode, said, strict=True)}
+    assert texts[Mode.GROUND] == []
+    assert texts[Mode.FOLLOW] == ["the hand jumped: the swarm holds until it moves like a hand again"]
+
+
+def test_who_waits_says_for_whom_and_who_is_missed_is_an_alarm() -> None:
+    stage = Stage()
+    waiting = replace(stage.drone(mode=Mode.GROUND, flags=Flag.WAITING), unheard=(2, 3))
+    (notice,) = notices({1: waiting}, (), hand_silent=False)
+    assert notice == {"level": "warning", "text": "drone 1 waits to hear drones 2, 3"}
+    (alarm,) = notices({1: stage.drone(flags=Flag.MISSED)}, (), hand_silent=False)
+    assert alarm["level"] == "alarm"
 
 
 def test_a_page_that_steers_and_is_not_heard_is_told() -> None:

@@ -12,7 +12,7 @@ from agents.vehicles.world.setup import referee_rules
 from deploy.cli import main
 from deploy.falsify.case import Case, Fault, FaultKind, Stroke, Weather, Wished
 from deploy.falsify.draw import FASTEST_HAND, Plan, draw_case
-from deploy.falsify.hand import poses, samples
+from deploy.falsify.hand import poses, samples, tracked
 from deploy.falsify.judge import CLASSES, broken, judge
 from deploy.falsify.keep import load_case, save_case
 from deploy.falsify.search import Budget, Finds, search, try_case
@@ -140,6 +140,16 @@ def test_a_silent_relay_makes_everybody_hold() -> None:
     flown = fly(fail("relay", 0, 1.0, math.inf))
     assert not flown.hearing[flown.t > 1.5].any()
     assert max(gone_from(flown, row, 4.0) for row in range(4)) < 0.05
+
+
+def test_a_hand_that_the_tracker_takes_for_a_drone_holds_and_nobody_is_touched() -> None:
+    case = evolve(fail("glitch", 1, 2.0, 2.2), strokes=())
+    _, formation = prepare(case.scenario, case.overrides)
+    said = samples(case, tracked(case, poses(case, 60.0), formation))
+    assert {sample.position for sample in said} == {REST}
+    assert 11 <= sum(sample.jumped for sample in said) <= 14
+    longer = judge(fly(fail("glitch", 1, 2.0, 6.0)), rules_of(case))
+    assert not broken(longer)
 
 
 @pytest.mark.parametrize("order", ["HOLD", "LAND"])

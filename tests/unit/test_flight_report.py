@@ -289,13 +289,13 @@ def test_a_flight_in_which_not_everybody_followed_the_hand_is_not_ok() -> None:
     summary = flight_summary(outcome(), monitor)
     assert summary["faults"] == ["the hand asked, but drones 3, 4 never followed it"]
     assert [agent["followed"] for agent in summary["agents"]] == [True, True, False, False]
-    assert summary["hand"] == {"asked": True, "rejected": 0, "remarks": []}
+    assert summary["hand"] == {"asked": True, "rejected": 0, "jumps": 0, "remarks": []}
 
 
 def test_nobody_is_to_blame_where_the_hand_never_asked() -> None:
     summary = flight_summary(outcome(), Swarm().say(hand(Wish.HOLD), state(1)))
     assert summary["ok"] is True
-    assert summary["hand"] == {"asked": False, "rejected": 0, "remarks": []}
+    assert summary["hand"] == {"asked": False, "rejected": 0, "jumps": 0, "remarks": []}
     assert re.search("the hand asked to fly +no", printed(summary))
 
 
@@ -305,7 +305,9 @@ def test_a_hand_of_which_every_pose_is_impossible_makes_no_flight() -> None:
 
     monitor = Swarm().say(hand(Wish.HOLD), relay(1, 10), relay(1, 25), relay(2, 5))
     summary = flight_summary(outcome(), monitor)
-    assert summary["hand"] == {"asked": False, "rejected": 30, "remarks": []}, "the relay was restarted"
+    assert summary["hand"] == {"asked": False, "rejected": 30, "jumps": 0, "remarks": []}, (
+        "the relay was restarted"
+    )
     assert summary["faults"] == ["nobody flew: all poses of the hand are impossible (30); metres?"]
 
 

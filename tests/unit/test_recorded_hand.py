@@ -1,5 +1,6 @@
 """A recorded hand is played by time: the same hand at any rate, in the simulator and in the relay."""
 
+import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from deploy.lockstep.hand_track import relayed
+from human_relay.guard import PROOF_S, WALK
 from human_relay.sources import open_source
 from shared.clock import NS_PER_S
 from shared.errors import ConfigError
@@ -109,3 +111,16 @@ def test_a_hand_that_is_over_at_once_is_refused(tmp_path: Path) -> None:
     path.write_text("t,x,y,z\n0,0,0,1\n0.001,0,0,1\n", encoding="ascii")
     with pytest.raises(ConfigError, match="the hand is over before it has begun"):
         relayed(f"recording:{path}?lead=0", 1.0, RATE_HZ)
+
+
+def test_a_recorded_hand_that_jumps_holds_and_is_walked_to(tmp_path: Path) -> None:
+    rows = [f"{k / 60},{0.0 if k < 60 else 1.5},0.2,1.2" for k in range(240)]
+    (tmp_path / "jump.csv").write_text("t,x,y,z\n" + "\n".join(rows) + "\n", encoding="ascii")
+    samples = relayed(f"recording:{tmp_path / 'jump.csv'}?lead=0", SECONDS, RATE_HZ)
+    steps = [math.dist(a.position, b.position) * RATE_HZ for a, b in itertools.pairwise(samples)]
+    assert max(steps) <= WALK + 1e-3
+    jumped = [sample for sample in samples if sample.jumped]
+    assert {sample.mode for sample in jumped} == {Wish.HOLD}
+    assert len(jumped) / RATE_HZ == pytest.approx(PROOF_S + 1.5 / WALK, abs=0.1)
+    assert samples[-1].position[0] == pytest.approx(1.5)
+    assert samples[-1].mode is Wish.FLY

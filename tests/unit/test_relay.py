@@ -1,3 +1,4 @@
+import itertools
 import math
 import os
 from collections.abc import Iterator
@@ -7,8 +8,18 @@ from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
+from human_relay.guard import WALK
 from human_relay.orders import OrderReader
-from human_relay.relay import PATIENCE_NS, PERIOD_NS, RelayState, has_news, make_sample, order, repeat_ns
+from human_relay.relay import (
+    PATIENCE_NS,
+    PERIOD_NS,
+    RelayState,
+    due_ns,
+    has_news,
+    make_sample,
+    order,
+    repeat_ns,
+)
 from human_relay.sources.base import HandPose
 from shared.clock import NS_PER_S
 from shared.codec import decode, encode
@@ -217,3 +228,29 @@ def test_the_end_of_the_input_is_no_order(pipe: tuple[OrderReader, int]) -> None
 
 def test_a_relay_without_standard_input_gets_no_orders() -> None:
     assert OrderReader(None).wait(0.0) == []
+
+
+def test_a_hand_that_jumps_holds_where_it_was_and_then_walks_there() -> None:
+    state, before = relay_moving_hand(30)
+    said = []
+    for tick in range(30, 180):
+        state, sample = make_sample(state, pose(tick, x=1.5), START + tick * PERIOD_NS)
+        said.append(sample)
+    held = [sample for sample in said if sample.jumped]
+    assert {sample.mode for sample in held} == {Wish.HOLD}
+    assert (held[0].position, held[0].velocity) == (before.position, ORIGIN)
+    steps = [math.dist(a.position, b.position) * 60.0 for a, b in itertools.pairwise([before, *said])]
+    assert max(steps) <= WALK + 1e-6
+    assert max(math.hypot(*sample.velocity) for sample in said) <= WALK + 1e-3
+    assert (said[-1].position[0], said[-1].mode, said[-1].jumped) == (1.5, Wish.FLY, False)
+    assert state.guard.jumps == 1
+
+
+@pytest.mark.parametrize("wish", [Wish.LAND, Wish.STOP])
+def test_the_operator_is_heard_even_if_the_hand_has_jumped(wish: Wish) -> None:
+    state, before = relay_moving_hand(12)
+    wild = evolve(pose(12, x=2.0), mode=wish)
+    assert due_ns(state, wild) == 0
+    state, sample = make_sample(state, wild, wild.t_ns)
+    assert (sample.mode, sample.position, sample.jumped) == (wish, before.position, True)
+    assert due_ns(state, wild) > wild.t_ns

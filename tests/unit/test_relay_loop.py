@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from human_relay.loop import run
-from human_relay.relay import IMPOSSIBLE_POSE
+from human_relay.relay import HAND_JUMP, IMPOSSIBLE_POSE
 from human_relay.sources import open_source
 from human_relay.sources.base import HandPose
 from shared.clock import NS_PER_S
@@ -159,7 +159,7 @@ def test_it_reports_once_a_second_and_at_the_end() -> None:
     assert [report.state for report in status] == ["running", "running", "running", "ending"]
     assert {(report.role, report.id) for report in status} == {("relay", 0)}
     assert status[-1].metrics == {"samples": len(samples)}
-    assert status[-1].rejected == {IMPOSSIBLE_POSE: 0}
+    assert status[-1].rejected == {IMPOSSIBLE_POSE: 0, HAND_JUMP: 0}
 
 
 def test_impossible_poses_are_counted_and_logged_now_and_then(
@@ -170,8 +170,10 @@ def test_impossible_poses_are_counted_and_logged_now_and_then(
     samples, status, _ = relay(f"recording:{tmp_path / 'hand.csv'}?lead=0", Operator(seconds=11.5))
     held = [sample for sample in samples if sample.mode is Wish.HOLD]
     assert len(held) > 300
-    assert status[-1].rejected == {IMPOSSIBLE_POSE: len(held)}
+    assert all(sample.jumped for sample in held)
+    assert status[-1].rejected == {IMPOSSIBLE_POSE: len(held), HAND_JUMP: len(held)}
     assert len(caplog.messages) == 3
+    assert max(abs(sample.position[0] + 15.0) for sample in samples) < 1e-3
     assert all("in metres?" in message for message in caplog.messages)
     assert "(15, 0, 1.2) m" in caplog.messages[0]
 

@@ -256,7 +256,7 @@ def test_of_a_hand_that_jumps_the_wish_counts_and_the_motion_does_not(wish: Wish
     hear(sensing, HAND.key(), SAMPLE)
     hear(sensing, HAND.key(), replace(JUMPED, mode=wish), at=16 * MS)
     assert sensing.hand is not None
-    assert sensing.hand.message == replace(SAMPLE, seq=11, mode=kept_wish)
+    assert sensing.hand.message == replace(SAMPLE, seq=11, mode=kept_wish, jumped=True)
     assert sensing.rejected == {"hand-jump": 1}
     hear(sensing, HAND.key(), replace(JUMPED, seq=12), at=200 * MS)
     assert sensing.hand.message == replace(JUMPED, seq=12)
