@@ -27,16 +27,22 @@ MEASURE = """(seconds) => new Promise((done) => {
     requestAnimationFrame(frame);
 })"""
 SECONDS = 3
-LEAST_HZ = 30.0
-LEAST_BUSY_HZ = 5.0
+LEAST_SHARE = 0.5
+LEAST_BUSY_SHARE = 0.08
 """Where the flight's own processes compete with the browser, which draws without a GPU, for two cores."""
 
 
-def frames_per_second(pilot: Pilot, drones: int) -> float:
-    """Measures, and says so."""
+def share_of_frames(pilot: Pilot, drones: int) -> float:
+    """Measures frames per second as a fraction of what an empty page gets at the same time, and says so."""
     rate_hz, longest_ms = pilot.page.evaluate(MEASURE, SECONDS)
-    print(f"\n{drones} drones: {rate_hz:.1f} frames/s, the longest frame {longest_ms:.0f} ms")
-    return float(rate_hz)
+    empty = pilot.page.context.new_page()
+    floor_hz, _ = empty.evaluate(MEASURE, SECONDS)
+    empty.close()
+    print(
+        f"\n{drones} drones: {rate_hz:.1f} frames/s, the longest frame {longest_ms:.0f} ms;"
+        f" an empty page {floor_hz:.1f} frames/s"
+    )
+    return float(rate_hz) / float(floor_hz)
 
 
 def test_the_page_keeps_up_with_a_flight_of_eight(browser: Browser, tmp_path: Path) -> None:
@@ -45,7 +51,7 @@ def test_the_page_keeps_up_with_a_flight_of_eight(browser: Browser, tmp_path: Pa
         pilot.take_off()
         x, y, _ = pilot.hand()
         pilot.drag_hand(x - 1.0, y + 0.5)
-        assert frames_per_second(pilot, 8) >= LEAST_BUSY_HZ
+        assert share_of_frames(pilot, 8) >= LEAST_BUSY_SHARE
         pilot.until(lambda: abs(pilot.hand()[1] - y - 0.5) < 0.1)
         pilot.close()
         assert pilot.errors == []
@@ -65,7 +71,7 @@ def test_the_page_itself_draws_many_drones(browser: Browser, tmp_path: Path, dro
             pilot.until(lambda: pilot.text("#swarm-state") == f"{drones} following")
             pilot.press("Take the hand")
             pilot.until(lambda: pilot.text("#hand-state") == "you hold it")
-            assert frames_per_second(pilot, drones) >= LEAST_HZ
+            assert share_of_frames(pilot, drones) >= LEAST_SHARE
             pilot.close()
             assert pilot.errors == []
     finally:

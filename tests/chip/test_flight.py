@@ -10,28 +10,31 @@ import pytest
 
 from glove_bridge.patterns import load_patterns
 from tests.chip.simulated_chip import SimulatedChip
+from tests.integration.floor import Floor
 from tests.integration.test_up import Launcher, launched, wait_until_flying
 from tests.replay.flights import busiest_flight
 
 pytestmark = [pytest.mark.chip, pytest.mark.timeout(180)]
 
 LATENCY_MS = 20.0
+"""Where the machine lets everybody run."""
 RECOVERY_MS = 3_000.0
 BOOTLOADER_MS = 1_600
 """As long as the bootloader of an UNO waits for a new program after every opening of the port."""
 
 
-def fly(process: Launcher) -> dict[str, Any]:
-    """Waits for the end of a flight and returns its summary."""
-    output, errors = process.communicate(timeout=150)
+def fly(process: Launcher) -> tuple[dict[str, Any], Floor]:
+    """Waits for the end of a flight; returns its summary, and what the machine gave meanwhile."""
+    with Floor() as floor:
+        output, errors = process.communicate(timeout=150)
     assert process.returncode == 0, errors
     summary: dict[str, Any] = json.loads(output.splitlines()[-1])
     assert summary["ok"]
     assert (summary["restarts"], summary["collisions"], summary["fence_exits"]) == (0, 0, 0)
     for agent in summary["agents"]:
-        assert agent["hand_used"] > 0.7
-        assert agent["rate_hz"] > 40.0
-    return summary
+        assert agent["hand_used"] > 0.7 * floor.slowest_share()
+        assert agent["rate_hz"] > 40.0 * floor.slowest_share()
+    return summary, floor
 
 
 def felt_in(summary: dict[str, Any], patterns: str) -> dict[str, Any]:
@@ -48,13 +51,14 @@ def test_the_summary_of_a_recorded_flight_tells_what_was_felt(chip: SimulatedChi
     hand = f"recording:{busiest_flight(30.0)}"
     arguments = ("--hand", hand, "--seconds", "30", "--glove", chip.uri, "--patterns", "flight", "--json")
     with launched(tmp_path / "runs", "maze", *arguments) as process:
-        glove = felt_in(fly(process), "flight")
+        summary, floor = fly(process)
+    glove = felt_in(summary, "flight")
     assert glove["uri"] == chip.uri
     delivered = sum(glove["delivered"].values())
     assert delivered >= 5
     assert (glove["lost"], glove["failed"]) == ({}, {})
     assert glove["played"] == glove["delivered"]
-    assert 0.0 < glove["latency_ms"]["p50"] <= LATENCY_MS
+    assert 0.0 < glove["latency_ms"]["p50"] <= LATENCY_MS + 2.0 * floor.late_ms()
     # Every pattern ends with all motors at rest.
     assert sum(not any(step.duties) for step in chip.steps) >= delivered
     assert not chip.turning
@@ -74,7 +78,8 @@ def test_unplugged_in_a_pattern_the_glove_comes_back_and_the_flight_goes_on(
         answered_ms = next(ms for ms in chip.times("said") if ms > plugged_ms)
         chip.wait(lambda chip: chip.turning, 30.0)
         felt_again_ms = chip.steps[-1].ms
-        glove = felt_in(fly(process), "paper")
+        summary, _ = fly(process)
+    glove = felt_in(summary, "paper")
     assert answered_ms - plugged_ms <= RECOVERY_MS
     on = [step for step in chip.steps if any(step.duties)]
     assert not [step for step in on if unplugged_ms < step.ms < answered_ms]

@@ -16,6 +16,7 @@ from shared.nodes import OBSERVER
 from shared.scenario import Scenario
 from shared.topics import DRONE_STATE, HAND, STATUS
 from shared.transport import Inbox
+from tests.integration.floor import Floor
 
 START_S = 30.0
 """Time for processes to start on a busy machine."""
@@ -34,6 +35,7 @@ class Recorder:
         statuses: Newest status per process, as `role/id`.
         present: Who announces itself.
         refused: Payloads that were no valid message, or of another drone.
+        floor: What this machine has given meanwhile to whoever only waits.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -45,6 +47,7 @@ class Recorder:
         self.present: set[str] = set()
         self.refused = 0
         self.clock = system_clock()
+        self.floor = Floor(self.clock)
         self._inbox = Inbox(self.clock, depth=1_000_000)
         self._known: set[tuple[int, int, int]] = set()
         # Best effort may lose a sample on one link; of two links, it hardly does on both.
@@ -105,6 +108,7 @@ class Recorder:
 
     def close(self) -> None:
         """Leaves the swarm."""
+        self.floor.close()
         for bus in self._buses:
             bus.close()
 

@@ -55,7 +55,8 @@ def test_two_milliseconds_in_one_agents_step_show_up_as_two_milliseconds() -> No
     ear, phase = fly(RHOMBUS, FORMATION, 3.0, edit=slowed("drone/2", 2.0))
     assert phase.ready
     step = {drone: median(times.step) for drone, times in ear.stats.hops.items()}
-    assert 1.5 < step[2] - step[3] < 3.5
+    # A busy machine may wake it later, never earlier.
+    assert step[2] - step[3] > 1.5
     # Of the latencies the quickest tenth: the others may have waited for the processor.
     latency = {drone: spread(values).p10 for drone, values in ear.stats.latencies_ms.items()}
     assert latency[2] - latency[3] > 1.5

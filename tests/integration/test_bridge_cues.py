@@ -12,14 +12,16 @@ from tests.integration.recorder import RELAY, START_S
 pytestmark = pytest.mark.timeout(120)
 
 SOON_NS = NS_PER_S
+"""Half a second of silence and a pattern that is in the way, where the machine lets everybody run."""
 
 
 def check_first(swarm: BridgedSwarm, cue: str, since_ns: int) -> None:
-    swarm.recorder.until(lambda: bool(swarm.felt_since(since_ns)), 5.0)
+    swarm.recorder.until(lambda: bool(swarm.felt_since(since_ns)), START_S)
     event = swarm.listener.started(since_ns)[0]
     print(f"{cue}: {(event.started_ns - since_ns) / 1e6:.0f} ms")
     assert event.pattern == cue
-    assert event.started_ns - since_ns <= SOON_NS
+    late_ns = swarm.recorder.floor.late_ms(100.0, since_ns) * 1e6
+    assert event.started_ns - since_ns <= SOON_NS + 2 * late_ns
 
 
 def test_a_killed_agent_and_a_silent_relay_are_felt(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 from glove_bridge.patterns import load_patterns
 from shared.config import load_scenario
-from shared.messages import PatternEvent
+from shared.messages import FormationState, PatternEvent
 from tests.integration.bridged import BridgeListener
 from tests.integration.recorder import START_S, Recorder
 from tests.replay.flights import busiest_flight
@@ -24,6 +24,7 @@ pytestmark = pytest.mark.timeout(150)
 SECONDS = 32.0
 """The recorded hand meets the first obstacles after about 25 s."""
 LATENCY_MS = 10.0
+"""Where the machine lets everybody run."""
 PERIOD_MS = 20.0
 """A little more than between two states of a drone."""
 
@@ -54,13 +55,17 @@ def test_patterns_come_quickly_and_the_summary_lists_them(tmp_path: Path) -> Non
     assert [f["t_ns"] for f in frames if f["frame"] == 0] == [event.started_ns for event in begun]
     check_summary(summary, listener)
     first, last = listener.states[0], listener.states[-1]
-    assert 15.0 < (last.seq - first.seq) * 1e9 / (last.stamp_ns - first.stamp_ns) < 25.0
+    assert 15.0 * recorder.floor.slowest_share() < rate_hz(first, last) < 25.0
     latency = [latency_ms(recorder, event) for event in brought_by_a_state(begun)]
     print(f"{summary['glove']}; from the drone's step: p50 {np.median(latency):.1f}, max {max(latency):.1f} ms")
-    assert np.median(latency) <= LATENCY_MS
+    assert np.median(latency) <= LATENCY_MS + 2.0 * recorder.floor.late_ms()
     assert summary["landed"]
     bridge_log = (tmp_path / "latest/logs/bridge.log").read_text()
     assert "Traceback" not in bridge_log
+
+
+def rate_hz(first: FormationState, last: FormationState) -> float:
+    return (last.seq - first.seq) * 1e9 / (last.stamp_ns - first.stamp_ns)
 
 
 def wait_for(file: Path, launcher: "subprocess.Popen[bytes]") -> None:

@@ -19,16 +19,20 @@ from tests.integration.test_up import children_of
 
 pytestmark = pytest.mark.timeout(150)
 
-REACTION_S = 3.0
-"""Within this time a swarm has reacted to a wish, on a busy machine, too."""
+REACTION_S = 20.0
+"""Within this time a swarm has reacted to a wish, on the busiest machine, too."""
 MOVES = 20
+MOST_SAMPLES = 4
+"""From a page to a set-point: the console, the relay's next sample, the step."""
+ADDRESS = re.compile(r"http://127\.0\.0\.1:(\d+)/")
 
 
 def port_of(flight: Launched) -> int:
-    """Returns the port of the console that the launcher has announced."""
-    text = (flight.runs / "launcher.log").read_text()
-    match = re.search(r"http://127\.0\.0\.1:(\d+)/", text)
-    assert match, text
+    """Returns the port of the console, once the launcher has announced it."""
+    log = flight.runs / "launcher.log"
+    flight.recorder.until(lambda: ADDRESS.search(log.read_text()) is not None, START_S)
+    match = ADDRESS.search(log.read_text())
+    assert match
     return int(match.group(1))
 
 
@@ -49,28 +53,32 @@ def take_off(page: Page, recorder: Recorder) -> None:
     recorder.until(lambda: recorder.all_in(Mode.FOLLOW), START_S)
 
 
-def input_to_setpoint_s(page: Page, recorder: Recorder) -> list[float]:
-    """Moves the hand in steps; returns how long each took to the first set-point of drone 1 that contains it.
+def input_to_setpoint(page: Page, recorder: Recorder) -> list[int]:
+    """Moves the hand in steps; returns in how many samples of the hand each came to a set-point of drone 1.
 
-    A step counts from the moment before it is sent; the hand is at rest before it.
+    A step counts from the newest sample before it is sent; the hand is at rest before it.
     """
-    times = []
+    samples, times = [], []
     x, y, z = page.newest["snapshot"]["hand"]["point"]
     for step in range(MOVES):
         recorder.listen(0.4)
         y += 0.05 if step % 2 else -0.05
-        rest = max(recorder.hands.values(), key=lambda hand: (hand.epoch, hand.seq)).position
+        rest = max(recorder.hands.values(), key=lambda hand: (hand.epoch, hand.seq))
         sent_ns = recorder.clock()
         page.point(x, y, z)
         recorder.listen(0.25)
         moving = [
-            h for h in recorder.hands.values() if h.stamp_ns > sent_ns and math.dist(h.position, rest) > 1e-5
+            hand
+            for hand in recorder.hands.values()
+            if hand.stamp_ns > sent_ns and math.dist(hand.position, rest.position) > 1e-5
         ]
         first = min(((h.epoch, h.seq) for h in moving), default=None)
         used = [s for s in recorder.since(1, sent_ns) if first and s.heard[HAND.key()][:2] >= first]
         if used:
+            samples.append(used[0].heard[HAND.key()].seq - rest.seq)
             times.append((used[0].stamp_ns - sent_ns) / NS_PER_S)
-    return times
+    print(f"input to set-point: p50 {1e3 * statistics.median(times):.1f} ms, n = {len(times)}")
+    return samples
 
 
 def test_a_killed_console_means_hold_and_it_comes_back_to_fly_on(tmp_path: Path) -> None:
@@ -82,7 +90,7 @@ def test_a_killed_console_means_hold_and_it_comes_back_to_fly_on(tmp_path: Path)
             x, y, z = page.newest["snapshot"]["hand"]["point"]
             page.point(x - 0.6, y, z)
             goal = recorder.latest(1).goal[0] - 0.4
-            recorder.until(lambda: recorder.latest(1).position[0] < goal, 10.0)
+            recorder.until(lambda: recorder.latest(1).position[0] < goal, START_S)
             assert recorder.all_in(Mode.FOLLOW)
 
             killed_ns = recorder.clock()
@@ -107,16 +115,15 @@ def test_a_killed_console_means_hold_and_it_comes_back_to_fly_on(tmp_path: Path)
     assert "Traceback" not in flight.logs()
 
 
-def test_a_page_flies_from_take_off_to_landing_within_40_ms(tmp_path: Path) -> None:
+def test_a_page_flies_from_take_off_to_landing_a_few_samples_behind(tmp_path: Path) -> None:
     with launched("slalom", "pointer://", tmp_path, arguments=("--console",), flying=False) as flight:
         recorder, port = flight.recorder, port_of(flight)
         with open_page(port) as watcher, open_page(port) as page:
             recorder.until(lambda: recorder.all_in(Mode.GROUND), START_S)
             take_off(page, recorder)
-            times = input_to_setpoint_s(page, recorder)
-            assert len(times) > MOVES * 0.8
-            print(f"input to set-point: p50 {1e3 * statistics.median(times):.1f} ms, n = {len(times)}")
-            assert statistics.median(times) <= 0.040, times
+            samples = input_to_setpoint(page, recorder)
+            assert len(samples) > MOVES * 0.8
+            assert statistics.median(samples) <= MOST_SAMPLES, samples
             watcher.say(type="hand", point=[0.0, 0.0, 1.0], yaw=0.0)
             watcher.until(lambda: "refused" in watcher.newest, REACTION_S)
 

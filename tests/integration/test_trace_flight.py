@@ -6,13 +6,11 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import attrs
-import numpy as np
 import pytest
 from attrs import frozen
 
@@ -33,6 +31,7 @@ from shared.nodes import OBSERVER, all_nodes
 from shared.scenario import Net
 from shared.topics import DRONE_STATE, HAND, TOPICS
 from shared.transport import Arrival, Inbox
+from tests.integration.floor import Floor
 from tests.integration.recorder import START_S, Recorder, slowest_rate_hz
 from tests.integration.swarm import launched
 from tests.integration.test_kill_flight import LOWEST_RATE_HZ
@@ -43,6 +42,7 @@ pytestmark = [
 ]
 
 LOST_AT_KILL_NS = NS_PER_S // 2
+"""Where the machine lets everybody run."""
 MOST_LOST = 0.05
 """Fraction of best-effort messages that a link may lose on a busy machine; idle, it loses none."""
 SHARE_OF_A_CORE = 0.25
@@ -114,7 +114,8 @@ def test_a_killed_recorder_loses_half_a_second_and_the_flight_does_not_notice(fl
     trace = open_trace(first)
     records = list(trace.records())
     assert trace.truncated
-    assert flown.killed_ns - max(record.log_ns for record in records) <= LOST_AT_KILL_NS
+    late_ns = flown.recorder.floor.late_ms(100.0) * 1e6
+    assert flown.killed_ns - max(record.log_ns for record in records) <= LOST_AT_KILL_NS + 2 * late_ns
     after = open_trace(second)
     assert next(after.records()).log_ns > flown.killed_ns
     assert not after.truncated
@@ -123,7 +124,8 @@ def test_a_killed_recorder_loses_half_a_second_and_the_flight_does_not_notice(fl
         states = [state for state in since if state.step_ns < flown.landing_ns]
         assert len({state.epoch for state in states}) == 1
         assert {state.mode for state in states} == {Mode.FOLLOW}
-        assert slowest_rate_hz(states) >= LOWEST_RATE_HZ
+        floor = flown.recorder.floor.slowest_share(states[0].step_ns)
+        assert slowest_rate_hz(states) >= LOWEST_RATE_HZ * floor
     assert (flown.summary["landed"], flown.summary["restarts"], flown.summary["collisions"]) == (True, 1, 0)
 
 
@@ -178,30 +180,6 @@ def test_info_reads_the_damaged_trace_and_says_so(flown: Flown) -> None:
     assert re.search(r"drone/4/state +observer +\d+ +\d+\.\d", told)
 
 
-class Floor(threading.Thread):
-    """How late this machine wakes a process that only waits, while something else is measured."""
-
-    PERIOD_S = 0.005
-
-    def __init__(self) -> None:
-        super().__init__(daemon=True)
-        self.late_ms: list[float] = []
-        self.ending = threading.Event()
-
-    def run(self) -> None:
-        clock = system_clock()
-        due_ns = clock()
-        while not self.ending.is_set():
-            due_ns = max(due_ns, clock()) + round(self.PERIOD_S * NS_PER_S)
-            self.ending.wait((due_ns - clock()) / NS_PER_S)
-            self.late_ms.append((clock() - due_ns) / 1e6)
-
-    def p99_ms(self) -> float:
-        self.ending.set()
-        self.join()
-        return float(np.percentile(self.late_ms, 99))
-
-
 @pytest.mark.parametrize("prefix", [PREFIX, ""])
 def test_a_replay_is_byte_exact_in_order_and_on_time(flown: Flown, prefix: str, tmp_path: Path) -> None:
     run = on_free_ports(trace_files(flown.run)[1], tmp_path)
@@ -209,12 +187,11 @@ def test_a_replay_is_byte_exact_in_order_and_on_time(flown: Flown, prefix: str, 
     sent: dict[str, list[bytes]] = {}
     for record in trace.records():
         sent.setdefault(prefix + record.key, []).append(record.payload)
-    inbox, floor = Inbox(system_clock(), depth=1_000_000), Floor()
+    inbox = Inbox(system_clock(), depth=1_000_000)
     command = [sys.executable, "-m", "deploy.cli", "trace", "replay", str(run), "--delay", "4"]
-    with open_observer(trace.scenario) as bus:
+    with open_observer(trace.scenario) as bus, Floor() as floor:
         for topic in TOPICS:
             bus.subscribe(prefix + topic.wildcard, inbox)
-        floor.start()
         done = subprocess.run(
             [*command, *([] if prefix else ["--as-live"])],
             capture_output=True,
@@ -224,13 +201,13 @@ def test_a_replay_is_byte_exact_in_order_and_on_time(flown: Flown, prefix: str, 
         )
         inbox.wait(1.0)
         heard = inbox.take()
-    late_floor = floor.p99_ms()
     assert heard.keys() == sent.keys()
     for key, payloads in sent.items():
         assert digest(arrival.payload for arrival in heard[key]) == digest(payloads), key
-    found = re.search(r"late by .* \(median\), ([\d.]+) ms \(p99\)", done.stdout)
+    # One moment without the processor makes more than one message in a hundred late.
+    found = re.search(r"late by ([\d.]+) ms \(median\)", done.stdout)
     assert found
-    assert float(found[1]) <= 2.0 + 2.0 * late_floor
+    assert float(found[1]) <= 2.0 + 2.0 * floor.late_ms()
 
 
 def digest(payloads: Iterable[bytes]) -> str:

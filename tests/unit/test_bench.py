@@ -192,16 +192,16 @@ def test_two_milliseconds_in_the_step_show_up_as_two_milliseconds(monkeypatch: p
     (quick,) = step.measure(n=60).records
     monkeypatch.setattr(Agent, "step", slower(Agent.step, 0.002))
     (slow,) = step.measure(n=60).records
-    for whole in ("median_us", "step_us"):
-        assert 1900.0 < slow[whole] - quick[whole] < 4000.0
-    assert slow["receive_us"] < 2000.0
+    # A busy machine may wake it later, never earlier.
+    assert all(slow[whole] - quick[whole] > 1900.0 for whole in ("median_us", "step_us"))
+    assert slow["receive_us"] < slow["step_us"]
     assert slow["n"] == 60
 
 
 def test_a_tick_of_twenty_milliseconds_is_slower_than_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Lockstep, "advance", slower(Lockstep.advance, 0.02))
     (record,) = lockstep.measure(drones=[2], seconds=0.2).records
-    assert 0.2 < record["realtime_factor"] < 1.0 / 60.0 / 0.02
+    assert 0.0 < record["realtime_factor"] < 1.0 / 60.0 / 0.02
     assert record["drones"] == 2
 
 
