@@ -26,7 +26,7 @@ _WIDTH = 110
 def main(*, number: int, run: Path, perfetto: Path | None, svg: Path | None) -> int:
     """Shows the way of one sample; returns the exit code, 1 if it came to nobody."""
     trace = open_trace(run)
-    flight = RecordedFlight(build_formation(trace.scenario), (message for _, message in trace.messages()))
+    flight = RecordedFlight(build_formation(trace.scenario), (message for _, message in trace.all_messages()))
     path, usual = follow(flight, number), typical(flight)
     console = open_console(stderr=False)
     if not console.is_terminal:

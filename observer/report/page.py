@@ -83,13 +83,17 @@ def fleet_table(rows: Mapping[str, FleetRow]) -> str:
     """Returns the fleet table as HTML: one row per flight, and their mean if there are several."""
     lines = {escape(name): attrs.astuple(row) for name, row in rows.items()}
     if len(lines) > 1:
-        lines["<strong>mean</strong>"] = tuple(np.mean(list(lines.values()), axis=0).tolist())
+        lines["<strong>mean</strong>"] = tuple(np.nanmean(list(lines.values()), axis=0).tolist())
     head = "".join(f"<th>{_HEADINGS[field.name]}</th>" for field in attrs.fields(FleetRow))
     body = "\n".join(
-        f"<tr><td>{name}</td>{''.join(f'<td>{value:.4f}</td>' for value in values)}</tr>"
+        f"<tr><td>{name}</td>{''.join(f'<td>{_number(value)}</td>' for value in values)}</tr>"
         for name, values in lines.items()
     )
     return f"<table><tr><th>flight</th>{head}</tr>\n{body}\n</table>"
+
+
+def _number(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.4f}"
 
 
 def _figure(shown: Shown) -> str:

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from observer.report.record import FlightRecord
+import numpy as np
+
+from observer.report.record import ROW_HZ, FlightRecord
 from observer.report.recordings import read_bag_flight, read_folder
 from observer.report.trace import read_trace
 from observer.trace.read import open_trace
@@ -23,9 +25,10 @@ def open_record(source: str | Path) -> FlightRecord:
     """
     path = Path(source)
     record = _read(path)
-    if record.t[-1] < SHORTEST:
+    seconds = np.count_nonzero(np.isfinite(record.position).all(axis=(1, 2))) / ROW_HZ
+    if seconds < SHORTEST:
         raise ConfigError(
-            f"{path}: the formation flew for {record.t[-1]:.1f} s; a report needs at least {SHORTEST:g} s"
+            f"{path}: the formation flew for {seconds:.1f} s; a report needs at least {SHORTEST:g} s"
         )
     return record
 

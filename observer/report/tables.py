@@ -73,7 +73,7 @@ def fleet_row(record: FlightRecord) -> FleetRow:
     """Returns the row of one flight; it has to be longer than `LANDING_ROWS`."""
     centroid = record.position.mean(axis=1)
     rates = _derivatives(record.recorded_t, centroid)
-    speeds = [float(np.nanmean(np.linalg.norm(rate, axis=1))) for rate in rates]
+    speeds = [_mean(np.linalg.norm(rate, axis=1)) for rate in rates]
     deviation = np.abs(areas(record) - record.default_area)[:-LANDING_ROWS]
     return FleetRow(
         path=float(np.nansum(np.linalg.norm(np.diff(centroid, axis=0), axis=1))),
@@ -84,6 +84,11 @@ def fleet_row(record: FlightRecord) -> FleetRow:
         area_std=float(np.nanstd(deviation)),
         area_max=float(np.nanmax(deviation)),
     )
+
+
+def _mean(values: Vec) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
 
 
 def areas(record: FlightRecord) -> Vec:

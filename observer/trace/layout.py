@@ -21,13 +21,6 @@ def trace_files(folder: Path) -> tuple[Path, ...]:
     return tuple(path for path in found if path.stat().st_size > len(MCAP0_MAGIC))
 
 
-def has_end(file: Path) -> bool:
-    """Says whether a trace was finished: an MCAP file ends with its magic bytes."""
-    with file.open("rb") as stream:
-        stream.seek(max(0, file.stat().st_size - len(MCAP0_MAGIC)))
-        return stream.read() == MCAP0_MAGIC
-
-
 def _number(path: Path) -> int:
     suffix = path.stem.removeprefix("trace-")
     return int(suffix) if suffix.isdecimal() else 1

@@ -1,37 +1,38 @@
 """Reads traces, whole or damaged: what is there is yielded, and what is not is said.
 
 A trace is one MCAP file, or a run directory with several: a recorder that was killed and started again begins
-a new one. A file that ends early (its recorder was killed) is read to its last complete chunk; a damaged chunk
-is skipped.
+a new one. A file may have been through other tools: with or without chunks, packed in any way, with its
+metadata at the end. One that ends early (its recorder was killed) is read to its last complete record; a
+damaged chunk is skipped, and so are bytes that are no records.
 """
 
-import struct
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Metadata
-from mcap.records import Message as McapMessage
-from mcap.stream_reader import StreamReader, get_chunk_data_stream
-from zstandard import ZstdError
-
-from observer.swarm import LATEST, RUNS
-from observer.trace.layout import RECORDER, SCENARIO, has_end, trace_files
-from shared.codec import decode_on
+from observer.swarm import LATEST, RUNS, SCENARIO_FILE
+from observer.trace import mcap_file
+from observer.trace.layout import RECORDER, SCENARIO, trace_files
+from observer.trace.mcap_file import DamageError, McapFile, MessageRecord
+from shared.codec import decode, decode_on
 from shared.config import structure_scenario
 from shared.errors import ConfigError, DecodeError
 from shared.messages import Message
+from shared.plain_text import plain
 from shared.scenario import Scenario
-from shared.toml_text import parse_toml
+from shared.toml_text import parse_toml, read_toml
+from shared.topics import TOPICS
 
-_LARGEST_RECORD = 1 << 28
+MOST_IN_MEMORY = 4_000_000
+"""Messages that whoever needs all of them at once takes: a quarter of an hour of 64 drones."""
+
+ENCODING = "msgpack"
+_MOST_METADATA = 100
+_MOST_NAMED = 10
 _LONGEST_COUNT = 20
 _RETIRED = (("net", "pointer_port"),)
 """Keys of the scenario that earlier recorders wrote, and that mean nothing any more."""
-_DAMAGE = (MemoryError, OverflowError, McapError, ZstdError, struct.error, ValueError, RuntimeError)
 
 
 class Record(NamedTuple):
@@ -52,6 +53,24 @@ class Record(NamedTuple):
     log_ns: int
 
 
+class Survey(NamedTuple):
+    """What a file says about itself outside its messages, wherever in it that stands.
+
+    Attributes:
+        metadata: Records by name.
+        channels: Number -> topic and encoding, as far as they stand outside chunks.
+        messages: How many there are to be; None if it does not say.
+        dropped: How many messages its recorder says it could not keep.
+        has_end: Whether it was finished.
+    """
+
+    metadata: dict[str, dict[str, str]]
+    channels: dict[int, tuple[str, str]]
+    messages: int | None
+    dropped: int
+    has_end: bool
+
+
 class Trace:
     """A recorded flight; may be read as often as one likes, but by one reader at a time.
 
@@ -61,29 +80,36 @@ class Trace:
     Attributes:
         files: Its files, oldest first.
         scenario: What flew, resolved.
-        metadata: Metadata records by name, of the first file.
+        metadata: Metadata records by name, of the first file that has a scenario.
         truncated: Whether a file has no end: its recorder was killed, or still records.
-        damaged: Chunks that could not be read, as far as has been read.
+        damaged: Records that could not be read, as far as has been read.
+        lost: Bytes that are no records, as far as has been read.
+        missing: Messages that are to be there and are not, as far as has been read.
         dropped: Messages that the recorder says it could not keep, as far as has been read.
+        foreign: Messages in other encodings than ours, by encoding, as far as has been read.
         rejected: Payloads that are no valid message by (key, reason), as far as has been read by `messages`.
 
     Raises:
-        ConfigError: The first file is no trace.
+        ConfigError: No file is a trace.
+        OSError: One cannot be read.
     """
 
     def __init__(self, files: tuple[Path, ...]) -> None:
         self.files = files
-        self.truncated = not all(map(has_end, files))
-        self.damaged = self.dropped = 0
+        self._surveys = [_survey(file) for file in files]
+        self.truncated = not all(survey.has_end for survey in self._surveys)
         self.rejected: Counter[tuple[str, str]] = Counter()
-        self.metadata = _head(files[0])
-        self.scenario = _scenario(self.metadata, files[0])
+        self._begin()
+        self.metadata, self.scenario, self._scenario_fault = _scenario(files, self._surveys)
 
     def records(self) -> Iterator[Record]:
         """Yields every payload in the order in which they were recorded, as far as readable."""
-        self.damaged = self.dropped = 0
-        for file in self.files:
-            yield from self._records_in(file)
+        self._begin()
+        for file, survey in zip(self.files, self._surveys, strict=True):
+            before = self._read
+            yield from self._records_in(file, survey)
+            self.dropped += survey.dropped
+            self.missing += max(0, (survey.messages or 0) - (self._read - before))
 
     def messages(self) -> Iterator[tuple[Record, Message]]:
         """Yields every valid message and its record; counts the others in `rejected`."""
@@ -94,42 +120,89 @@ class Trace:
             except DecodeError as error:
                 self.rejected[record.key, error.reason] += 1
 
+    def all_messages(self) -> Iterator[tuple[Record, Message]]:
+        """Yields the same, to who keeps them.
+
+        Raises:
+            ConfigError: They are more than can be kept.
+        """
+        for count, item in enumerate(self.messages()):
+            if count >= MOST_IN_MEMORY:
+                raise ConfigError(
+                    f"{self.files[0]}: more than {MOST_IN_MEMORY} messages; take a part of it: mcap filter"
+                )
+            yield item
+
     @property
     def faults(self) -> list[str]:
         """Returns in words what is missing, as far as has been read; empty if nothing is."""
-        told = {
+        told: dict[str, object] = {
             "it has no end: its recorder was killed or still runs": self.truncated,
+            self._scenario_fault: self._scenario_fault,
             f"{self.damaged} damaged chunks were skipped": self.damaged,
+            f"{self.lost} damaged bytes were skipped": self.lost,
+            f"{self.missing} messages that it counts are not in it": self.missing,
             f"its recorder could not keep up and dropped {self.dropped} messages": self.dropped,
+            f"{self._nameless} messages are on channels whose definition is damaged": self._nameless,
         }
-        return [text for text, is_so in told.items() if is_so]
+        return [
+            *(text for text, is_so in told.items() if is_so),
+            *(f"{count} messages are {plain(name)}, not {ENCODING}" for name, count in self.foreign.items()),
+        ]
 
-    def _records_in(self, file: Path) -> Iterator[Record]:
-        topics: dict[int, str] = {}
-        dropped = 0
-        for item in _top_level(file):
-            if isinstance(item, Chunk):
-                yield from self._records_of(item, topics)
-            elif isinstance(item, Metadata) and item.name == RECORDER:
-                dropped = _count(item.metadata.get("dropped", ""))
-        self.dropped += dropped
+    def _begin(self) -> None:
+        self.damaged = self.lost = self.missing = self.dropped = self._nameless = self._read = 0
+        self.foreign: Counter[str] = Counter()
 
-    def _records_of(self, chunk: Chunk, topics: dict[int, str]) -> Iterator[Record]:
-        """Takes a chunk apart bit by bit: a replay has no time for a whole one."""
-        try:
-            data, length = get_chunk_data_stream(chunk, validate_crc=True)
-            while data.count < length:
-                opcode, size = data.read1(), data.read8()
-                if opcode == Opcode.CHANNEL:
-                    channel = Channel.read(data)
-                    topics[channel.id] = channel.topic
-                elif opcode == Opcode.MESSAGE:
-                    message = McapMessage.read(data, size)
-                    yield _record(topics[message.channel_id], message)
+    def _records_in(self, path: Path, survey: Survey) -> Iterator[Record]:
+        channels = dict(survey.channels)
+        with mcap_file.open_mcap(path) as stream:
+            file = McapFile(stream)
+            for opcode, content in self._outside_chunks(file):
+                if opcode == mcap_file.CHUNK:
+                    yield from self._understood(self._in_chunk(content), channels)
                 else:
-                    data.read(size)
-        except (*_DAMAGE, KeyError):
+                    yield from self._understood([(opcode, content)], channels)
+            self.lost += file.lost
+
+    def _outside_chunks(self, file: McapFile) -> Iterator[tuple[int, bytes]]:
+        for located in file.records():
+            if located.opcode in (mcap_file.CHUNK, mcap_file.CHANNEL, mcap_file.MESSAGE):
+                try:
+                    yield located.opcode, file.content(located)
+                except DamageError:
+                    self.damaged += 1
+
+    def _in_chunk(self, content: bytes) -> Iterator[tuple[int, bytes]]:
+        try:
+            yield from mcap_file.open_chunk(content)
+        except DamageError:
             self.damaged += 1
+
+    def _understood(
+        self, records: Iterable[tuple[int, bytes]], channels: dict[int, tuple[str, str]]
+    ) -> Iterator[Record]:
+        """Yields the messages among records; learns the channels among them."""
+        for opcode, content in records:
+            try:
+                if opcode == mcap_file.CHANNEL:
+                    channel = mcap_file.read_channel(content)
+                    channels[channel.id] = (channel.topic, channel.encoding)
+                elif opcode == mcap_file.MESSAGE:
+                    message = mcap_file.read_message(content)
+                    self._read += 1
+                    yield from self._known(message, channels)
+            except DamageError:
+                self.damaged += 1
+
+    def _known(self, message: MessageRecord, channels: dict[int, tuple[str, str]]) -> Iterator[Record]:
+        topic, encoding = channels.get(message.channel_id, (None, ENCODING))
+        if encoding not in (ENCODING, ""):
+            self.foreign[encoding] += 1
+        elif (key := _key_of(message.data) if topic is None else topic) is None:
+            self._nameless += 1
+        else:
+            yield Record(key, message.data, message.sequence, message.publish_ns, message.log_ns)
 
 
 def open_trace(source: str | Path | None = None) -> Trace:
@@ -153,40 +226,79 @@ def open_trace(source: str | Path | None = None) -> Trace:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
 
 
-def _top_level(file: Path) -> Iterator[object]:
-    """Yields what a file holds outside its chunks, and the chunks; ends where it cannot be read on."""
-    with file.open("rb") as stream:
-        reader = StreamReader(stream, emit_chunks=True, record_size_limit=_LARGEST_RECORD)
+def _survey(path: Path) -> Survey:
+    metadata: dict[str, dict[str, str]] = {}
+    channels: dict[int, tuple[str, str]] = {}
+    messages, dropped = None, 0
+    with mcap_file.open_mcap(path) as stream:
+        file = McapFile(stream)
+        for record in file.records():
+            try:
+                match record.opcode:
+                    case mcap_file.METADATA:
+                        name, entries = mcap_file.read_metadata(file.content(record))
+                        if name == RECORDER:
+                            dropped = _count(entries.get("dropped", ""))
+                        elif len(metadata) < _MOST_METADATA:
+                            metadata.setdefault(name, entries)
+                    case mcap_file.CHANNEL:
+                        channel = mcap_file.read_channel(file.content(record))
+                        channels[channel.id] = (channel.topic, channel.encoding)
+                    case mcap_file.STATISTICS:
+                        messages = mcap_file.read_message_count(file.content(record))
+            except DamageError:
+                continue
+        return Survey(metadata, channels, messages, dropped, file.has_end)
+
+
+def _scenario(
+    files: tuple[Path, ...], surveys: list[Survey]
+) -> tuple[dict[str, dict[str, str]], Scenario, str]:
+    """Returns the metadata of a trace, what flew, and what is wrong with that in the trace itself, in words.
+
+    Raises:
+        ConfigError: Nobody knows what flew.
+    """
+    why = f"it holds no scenario{_described(surveys)}"
+    for file, survey in zip(files, surveys, strict=True):
+        if SCENARIO not in survey.metadata:
+            continue
         try:
-            yield from reader.records
-        except _DAMAGE:
-            return
+            toml = survey.metadata[SCENARIO].get("toml", "")
+            return survey.metadata, _structured(parse_toml(toml, str(file)), file), ""
+        except ConfigError as error:
+            why = f"its scenario is damaged: {error}"
+    beside = files[0].parent / SCENARIO_FILE
+    if beside.is_file():
+        fault = f"{why}; that of {SCENARIO_FILE} beside it is taken"
+        return surveys[0].metadata, _structured(read_toml(beside), beside), fault
+    raise ConfigError(f"{files[0]}: not a trace of a swarm: {why}")
 
 
-def _head(file: Path) -> dict[str, dict[str, str]]:
-    metadata = {}
-    for item in _top_level(file):
-        if isinstance(item, Metadata):
-            metadata[item.name] = item.metadata
-        elif isinstance(item, Chunk):
-            break
-    return metadata
-
-
-def _scenario(metadata: dict[str, dict[str, str]], file: Path) -> Scenario:
-    try:
-        tree = parse_toml(metadata[SCENARIO]["toml"], str(file))
-    except KeyError as error:
-        raise ConfigError(f"{file}: not a trace of a swarm: it holds no scenario") from error
+def _structured(tree: dict[str, Any], file: Path) -> Scenario:
     for table, key in _RETIRED:
         if isinstance(tree.get(table), dict):
             tree[table].pop(key, None)
     return structure_scenario(tree, str(file))
 
 
+def _described(surveys: list[Survey]) -> str:
+    """Names what is in files, as far as it stands outside chunks."""
+    found = sorted({channel for survey in surveys for channel in survey.channels.values()})
+    named = [f"{plain(topic)} ({plain(encoding)})" for topic, encoding in found[:_MOST_NAMED]]
+    return f", but {', '.join(named)}" if named else ""
+
+
+def _key_of(payload: bytes) -> str | None:
+    """Tells by a message what it was sent on."""
+    for topic in TOPICS:
+        try:
+            message = decode(payload, topic.kind)
+        except DecodeError:
+            continue
+        return topic.pattern.format(**{name: getattr(message, name) for name in message.__struct_fields__})
+    return None
+
+
 def _count(text: str) -> int:
     return int(text) if text.isdecimal() and len(text) < _LONGEST_COUNT else 0
-
-
-def _record(key: str, message: McapMessage) -> Record:
-    return Record(key, message.data, message.sequence, message.publish_time, message.log_time)

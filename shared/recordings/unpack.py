@@ -8,12 +8,18 @@ LARGEST_CHUNK = 1 << 26
 """Bytes of the largest chunk of a recording, packed or not: recorders make them of about a MB."""
 
 
+MOST_GROWTH = 1_000
+"""Times its size that a chunk may unpack to; what moves and is stamped gets ten times larger, or twenty."""
+_SMALL = 1 << 20
+"""Bytes that any chunk may unpack to."""
+
+
 class UnpackError(ValueError):
     """Data that is damaged, packed in an unknown way, or would grow beyond all bounds."""
 
 
 def unpack(data: bytes, compression: str, most: int = LARGEST_CHUNK) -> bytes:
-    """Unpacks a chunk; what it takes in memory is bounded by `most`, not by what the data says.
+    """Unpacks a chunk; what it takes is bounded by `most` and by its size, not by what the data says.
 
     Args:
         data: The chunk; what is missing at its end is missing in the result.
@@ -23,6 +29,8 @@ def unpack(data: bytes, compression: str, most: int = LARGEST_CHUNK) -> bytes:
     Raises:
         UnpackError: It is damaged, it becomes more, or the compression is unknown.
     """
+    if compression not in ("", "none"):
+        most = min(most, max(_SMALL, MOST_GROWTH * len(data)))
     try:
         unpacked = _at_most(data, compression, most + 1)
     except UnpackError:

@@ -6,13 +6,17 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from observer.report.figures import FIGURES
 from observer.report.record import FlightRecord
 from observer.report.source import open_record
 from observer.report.tables import areas, fleet_row, reactions
 from observer.report.write import write_report
+from shared.messages import DroneState
 from tests.flight_folders import Seen, body_place, write_flight
+from tests.synthetic_swarm import T0, TICK, fly
+from tests.unit.test_report import write_trace
 
 ADVICE = ((2.0, "contracted_right"), (6.0, "extended_left"))
 
@@ -89,3 +93,27 @@ def test_every_figure_is_drawn_and_its_table_is_empty_in_the_gap(tmp_path: Path,
     assert len(gap) > 50
     assert {row[column] for row in gap} == {""}
     assert "" not in {row[column] for row in rows if float(row["t"]) < 3.99}
+
+
+def test_who_was_silent_in_a_trace_has_a_gap_there(tmp_path: Path) -> None:
+    begin, end = T0 + 100 * TICK, T0 + 160 * TICK
+    messages = [
+        m for m in fly(300) if not (isinstance(m, DroneState) and m.id == 2 and begin < m.step_ns < end)
+    ]
+    record = open_record(write_trace(tmp_path / "run", messages))
+    silent = np.isnan(record.position[:, 1, 0])
+    assert 50 < np.count_nonzero(silent) < 65
+    assert not np.isnan(np.delete(record.position, 1, axis=1)).any()
+    assert "drone 2: a gap of 1.0 s" in record.remarks
+    write_report([record], tmp_path / "report")
+
+
+@pytest.mark.parametrize("stamp", [0, 2**63 - 1, 2**63, 2**64 - 1, T0 + 10**15])
+def test_one_stamp_that_cannot_be_costs_one_state(tmp_path: Path, stamp: int) -> None:
+    messages = fly(300)
+    at = next(k for k, m in enumerate(messages) if isinstance(m, DroneState) and (m.id, m.seq) == (3, 120))
+    messages[at] = replace(messages[at], step_ns=stamp)
+    record = open_record(write_trace(tmp_path, messages))
+    assert not np.isnan(record.position).any()
+    assert record.t[-1] < 5.0
+    assert any(remark.startswith("drone 3: 1 of ") for remark in record.remarks)
