@@ -14,7 +14,7 @@ COMPILE := UV_PROJECT_ENVIRONMENT=$(COMPILER) $(UV) sync --frozen --quiet --no-d
 	--no-install-project --python $(BIN)/python && $(COMPILER)/bin/python -m deploy.compile
 WHERE_POSSIBLE := if $(BIN)/python -m deploy.compile.toolchain; then $(COMPILE) || echo "flying in the pure form"; fi
 
-.PHONY: help demo env compile test check lint chip chaos clean
+.PHONY: help demo env compile test check lint chip chaos wheels clean
 
 help:  ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
@@ -54,17 +54,21 @@ chip:  ## the glove's firmware, its fuzzer, and a simulated chip that runs it; t
 chaos: $(DEVELOPMENT)  ## as root: kill, freeze, part and flood a swarm in network namespaces; one table
 	$(BIN)/python -m tests.chaos --csv runs/chaos.csv
 
+wheels: | $(UV)  ## into dist/: a wheel for every Python and, with a C compiler, a compiled one for this Python here
+	$(UV) build --wheel
+
 clean:  ## remove what was set up and cached; flights in runs/ stay
-	rm -rf .bootstrap .venv build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .bootstrap .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# --inexact: flying never removes the tools of an environment for development.
+# --inexact: flying never removes the tools of an environment for development. Pure: a checkout is compiled by
+# `compile`, whose tools its installation then does not need.
 $(RUNTIME): pyproject.toml uv.lock | $(UV)
-	$(UV) sync --frozen --no-dev --inexact
+	SWARMTOUCH_PURE=1 $(UV) sync --frozen --no-dev --inexact
 	@touch $@
 
 $(DEVELOPMENT): pyproject.toml uv.lock | $(UV)
-	$(UV) sync --frozen
+	SWARMTOUCH_PURE=1 $(UV) sync --frozen
 	@touch $@ $(RUNTIME)
 
 $(UV):

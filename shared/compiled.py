@@ -12,7 +12,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, ModuleSpec
-from importlib.util import module_from_spec, source_hash
+from importlib.util import decode_source, module_from_spec, source_hash
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -137,6 +137,33 @@ def read_manifest(text: str) -> Manifest:
     )
 
 
+class CompiledLoader(ExtensionFileLoader):
+    """Loads a module from a binary, and has the source at hand for whoever shows a traceback.
+
+    Args:
+        name: Of the module.
+        path: The binary.
+        source: What it was made from.
+    """
+
+    def __init__(self, name: str, path: str, source: Path) -> None:
+        super().__init__(name, path)
+        self._source = source
+
+    def exec_module(self, module: ModuleType) -> None:
+        """See `importlib.abc.Loader`; mypyc has set a loader of its own, of which nobody gets a source."""
+        super().exec_module(module)
+        module.__loader__ = self
+
+    def get_source(self, fullname: str) -> str | None:  # type: ignore[override]  # extensions have none
+        """See `importlib.abc.InspectLoader`; None if there is none to be read."""
+        del fullname
+        try:
+            return decode_source(self._source.read_bytes())
+        except (OSError, SyntaxError, UnicodeDecodeError):
+            return None
+
+
 class Binaries:
     """Binaries on disk.
 
@@ -179,9 +206,10 @@ class Binaries:
             del sys.modules[LIBRARY]
             raise
 
-    def loader(self, name: str) -> ExtensionFileLoader:
+    def loader(self, name: str) -> CompiledLoader:
         """Returns what loads a module."""
-        return ExtensionFileLoader(name, str(self._folder / self.manifest.binaries[name][0]))
+        source = self._root / f"{name.replace('.', '/')}.py"
+        return CompiledLoader(name, str(self._folder / self.manifest.binaries[name][0]), source)
 
     def spec(self, name: str) -> ModuleSpec:
         """Returns how a module is imported."""
@@ -238,9 +266,14 @@ def form() -> Form:
     return next(finder.form() for finder in sys.meta_path if isinstance(finder, CompiledFinder))
 
 
+def pure_is_asked_for() -> bool:
+    """Says whether the environment asks for the pure form."""
+    return os.environ.get(PURE, "0") not in ("", "0")
+
+
 def _find(root: Path) -> tuple[Binaries | None, Form | None]:
     """Returns the binaries for this process, or why it has to be the pure form."""
-    if os.environ.get(PURE, "0") not in ("", "0"):
+    if pure_is_asked_for():
         return None, Form(reason=f"{PURE} is set")
     for place in (root / SHIPPED, root / BUILT):
         file = manifest_file(place)
