@@ -34,6 +34,7 @@ compile: $(RUNTIME)  ## compile the control law to native code; demo, env and te
 test: lint  ## everything CI runs: format, lint, types, import contracts, all tests
 	@$(WHERE_POSSIBLE)
 	$(BIN)/pytest --numprocesses auto tests/unit tests/contract tests/replay
+	SWARMTOUCH_PURE=1 $(BIN)/pytest --numprocesses auto -m law tests/unit tests/contract tests/replay
 	$(BIN)/pytest --reruns 2 -raR tests/integration
 
 check: lint  ## the quick gate: format, lint, types, import contracts, unit tests

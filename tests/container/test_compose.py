@@ -53,6 +53,10 @@ def test_the_image_is_small_runs_as_nobody_special_and_has_no_compiler(
     assert docker("run", "--rm", "--entrypoint", "sh", image, "-c", script).split() == ["10001"]
 
 
+def test_the_image_flies_the_compiled_law(image: str) -> None:
+    assert ", law compiled " in docker("run", "--rm", "--entrypoint", "swarmtouch", image, "--version")
+
+
 @pytest.mark.usefixtures("image")
 def test_the_demo_flies_loses_a_container_heals_and_leaves_nothing() -> None:
     project = Project(compose_commands()[-1], "swarmtouch-test", [COMPOSE_FILE])

@@ -63,7 +63,7 @@ except ZeroDivisionError:
 
 
 def build(root: Path) -> subprocess.Popen[str]:
-    command = [COMPILER, "-c", BUILD, root, BUILT, *MODULES]
+    command = [str(COMPILER), "-c", BUILD, str(root), BUILT, *MODULES]
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 

@@ -105,7 +105,7 @@ def test_an_installed_wheel_says_what_it_is(installed: Installed) -> None:
 
 
 def test_an_installed_wheel_flies(installed: Installed) -> None:
-    told = installed.ask("up", "rhombus", "--seconds", "3", "--json", "--runs", installed.folder / "runs")
+    told = installed.ask("up", "rhombus", "--seconds", "12", "--json", "--runs", installed.folder / "runs")
     assert json.loads(told.splitlines()[-1])["ok"]
     for log in ("drone-1.log", "drone-4.log", "world.log"):
         text = next((installed.folder / "runs").rglob(log)).read_text(encoding="utf-8")
