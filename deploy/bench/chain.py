@@ -1,25 +1,31 @@
 """`bench chain`: from the hand to the set-point of the last drone, against two floors in the same run.
 
 Three swarms of the same shape take turns, A B C A B C: real agents in a simulated flight, bare nodes over
-Zenoh with the same links, subscriptions and payload sizes, and bare nodes over UDP sockets. With keys (profile
-`field`) the same agents without keys take turns with them; the floors never have any. A latency runs from the
-stamp of a hand sample to the stamp of the first set-point that contains it through every hop.
+Zenoh with the same links, subscriptions and payload sizes, and bare nodes over UDP sockets. Where the law is
+compiled, agents of its pure form take turns with them, and with keys (profile `field`) the same agents without
+keys; the floors never have any. A latency runs from the stamp of a hand sample to the stamp of the first
+set-point that contains it through every hop.
 """
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
+from attrs import evolve
 
 from deploy.bench.figures import TEXT_COLUMNS, Spread, draw_shares, ratio_by_round, spread
 from deploy.bench.flight_ear import HopTimes
 from deploy.bench.profile import FIELD, in_profile, plain, signature_cost
 from deploy.bench.report import Json, Report, Sheet
 from deploy.bench.swarm import BenchError, Edit, fly, fly_bare_udp, fly_bare_zenoh
+from deploy.launcher.process_table import ProcessRow
+from shared.compiled import PURE, form
 from shared.config import load_scenario
 from shared.formation import build_formation
+from shared.scenario import Scenario
 
 NAMES = {
+    "pure": "agents, pure form",
     "real": "agents",
     "plain": "agents without keys",
     "zenoh": "bare nodes, Zenoh",
@@ -57,22 +63,25 @@ def measure(
     formation = build_formation(loaded, scenario)
     last = formation.ids[formation.levels[-1][-1]]
     floor = plain(loaded)
-    hops: dict[int, list[HopTimes]] = {drone: [] for drone in formation.ids}
     sizes: dict[int, int] = {}
     with in_profile(loaded, formation, profile) as settings:
-        names = [name for name in NAMES if name != "plain" or settings.net.keys]
-        taken: dict[str, list[list[float]]] = {name: [] for name in names}
+        flown: dict[str, tuple[Scenario, Edit]] = {"real": (settings, edit)}
+        if form().digest:
+            flown["pure"] = (settings, lambda row: in_pure_form(edit(row)))
+        if settings.net.keys:
+            flown["plain"] = (floor, edit)
+        taken: dict[str, list[list[float]]] = {
+            name: [] for name in NAMES if name in flown or name in ("zenoh", "udp")
+        }
+        hops: dict[str, list[dict[int, HopTimes]]] = {name: [] for name in flown}
         for turn in range(rounds):
-            say(f"round {turn + 1} of {rounds}: agents, {settings.net.profile}")
-            flight, _ = fly(settings, formation, seconds / rounds, edit=edit)
-            taken["real"].append(flight.stats.latencies_ms[last])
-            for drone, times in flight.stats.hops.items():
-                hops[drone].append(times)
-            sizes = sizes or flight.payload_bytes()
-            if settings.net.keys:
-                say(f"round {turn + 1} of {rounds}: {NAMES['plain']}")
-                flight, _ = fly(floor, formation, seconds / rounds, edit=edit)
-                taken["plain"].append(flight.stats.latencies_ms[last])
+            for name, (flying, change) in flown.items():
+                say(f"round {turn + 1} of {rounds}: {NAMES[name]}, {flying.net.profile}")
+                flight, _ = fly(flying, formation, seconds / rounds, edit=change)
+                taken[name].append(flight.stats.latencies_ms[last])
+                hops[name].append(flight.stats.hops)
+                # Those of the first: with keys, and so a signature, if there are any.
+                sizes = sizes or flight.payload_bytes()
             for name, fly_bare in (("zenoh", fly_bare_zenoh), ("udp", fly_bare_udp)):
                 say(f"round {turn + 1} of {rounds}: {NAMES[name]}")
                 ear, _ = fly_bare(floor, formation, sizes, seconds / rounds)
@@ -83,13 +92,19 @@ def measure(
     for name, turns in taken.items():
         if not all(turns):
             raise BenchError(f"{NAMES[name]}: no hand sample came through to drone {last}; measure longer")
-    return _report(settings.net.profile, taken, _hop_medians(hops), sizes, cost)
+    medians = {name: _hop_medians(turns) for name, turns in hops.items()}
+    return _report(settings.net.profile, taken, medians, sizes, cost)
+
+
+def in_pure_form(row: ProcessRow) -> ProcessRow:
+    """Has a process run the law in its pure form."""
+    return evolve(row, command=("/usr/bin/env", f"{PURE}=1", *row.command))
 
 
 def _report(
     profile: str,
     taken: dict[str, list[list[float]]],
-    hops: dict[int, Json],
+    hops: dict[str, dict[int, Json]],
     sizes: dict[int, int],
     cost: Json,
 ) -> Report:
@@ -113,16 +128,23 @@ def _report(
         "floor_n": of["zenoh"].n,
         "udp_n": of["udp"].n,
         "payload_bytes": {str(node): size for node, size in sorted(sizes.items())},
-        "hops": hops,
+        "hops": hops["real"],
         **cost,
     }
+    if "pure" in of:
+        record |= {"pure_p50_ms": of["pure"].p50, "pure_p99_ms": of["pure"].p99, "pure_n": of["pure"].n}
+        record |= {"pure_ratio": of["pure"].p50 / of["zenoh"].p50, "pure_hops": hops["pure"]}
+        record |= {"pure_ratio_by_round": ratio_by_round(taken["pure"], taken["zenoh"])}
     if "plain" in of:
         record |= {"plain_p50_ms": of["plain"].p50, "plain_p99_ms": of["plain"].p99, "plain_n": of["plain"].n}
         record |= {"profile_ratio_by_round": ratios["real"]}
     return Report(
         name="chain-field" if profile == FIELD else "chain",
         records=(record,),
-        sheets=(_latency_sheet(of, ratios), _hop_sheet(hops)),
+        sheets=(
+            _latency_sheet(of, ratios),
+            *(_hop_sheet(NAMES[name], hops[name]) for name in ("real", "pure") if name in hops),
+        ),
         draw=lambda figure: draw_shares(
             figure,
             {NAMES[name]: values for name, values in pooled.items()},
@@ -131,12 +153,12 @@ def _report(
     )
 
 
-def _hop_medians(hops: dict[int, list[HopTimes]]) -> dict[int, Json]:
+def _hop_medians(turns: Sequence[dict[int, HopTimes]]) -> dict[int, Json]:
     def median(drone: int, part: str) -> float:
-        values = [value for times in hops[drone] for value in getattr(times, part)]
+        values = [value for hops in turns for value in getattr(hops[drone], part)]
         return float(np.median(values)) if values else 0.0
 
-    return {drone: {f"{part}_ms": median(drone, part) for part in HOP_PARTS} for drone in hops}
+    return {drone: {f"{part}_ms": median(drone, part) for part in HOP_PARTS} for drone in turns[0]}
 
 
 def _latency_sheet(of: dict[str, Spread], ratios: dict[str, list[float]]) -> Sheet:
@@ -151,13 +173,13 @@ def _latency_sheet(of: dict[str, Spread], ratios: dict[str, list[float]]) -> She
     )
 
 
-def _hop_sheet(hops: dict[int, Json]) -> Sheet:
+def _hop_sheet(name: str, hops: dict[int, Json]) -> Sheet:
     rows = (
         (f"drone {drone}", *(f"{times[f'{part}_ms']:.2f}" for part in HOP_PARTS))
         for drone, times in hops.items()
     )
     return Sheet(
-        title="Of that, agents: medians from the last input of a step on, ms",
+        title=f"Of that, {name}: medians from the last input of a step on, ms",
         columns=("", "encoding and transport", "decoding and waiting", "pose and step"),
         rows=tuple(rows),
     )

@@ -4,7 +4,7 @@ import socket
 from collections.abc import Iterable, Sequence
 
 from deploy.bench.floor_udp import LOOPBACK, MAX_DATAGRAM
-from deploy.bench.hop import unpack
+from deploy.bench.hop import Token, unpack
 from deploy.launcher.monitor import INBOX_DEPTH
 from shared.clock import NS_PER_S, system_clock
 from shared.formation import Formation
@@ -19,31 +19,39 @@ class FloorEar:
         formation: Its drones' numbers are those of the nodes.
 
     Attributes:
-        latencies_ms: By node: from the stamp of a hand sample to the stamp of the answer that completes it.
+        answers: What each drone's node has sent.
         payload_bytes: Size of the newest payload, by node, 0 for the hand.
     """
 
     def __init__(self, formation: Formation) -> None:
         self._ids = formation.ids
-        self.latencies_ms: dict[int, list[float]] = {}
+        self.answers: dict[int, list[Token]] = {}
         self.payload_bytes: dict[int, int] = {}
         self.begin()
+
+    @property
+    def latencies_ms(self) -> dict[int, list[float]]:
+        """By node: from the stamp of a hand sample to the stamp of the answer that completes it."""
+        return {
+            node: [(token.stamp_ns - token.hand_ns) * 1e3 / NS_PER_S for token in tokens]
+            for node, tokens in self.answers.items()
+        }
 
     def take(self, payload: bytes) -> None:
         """Counts one payload."""
         token = unpack(payload)
         self.payload_bytes[token.node] = len(payload)
-        if token.node in self.latencies_ms:
-            self.latencies_ms[token.node].append((token.stamp_ns - token.hand_ns) * 1e3 / NS_PER_S)
+        if token.node in self.answers:
+            self.answers[token.node].append(token)
 
     @property
     def is_ready(self) -> bool:
         """Whether the hand has come through to every node."""
-        return all(self.latencies_ms.values())
+        return all(self.answers.values())
 
     def begin(self) -> None:
-        """Forgets the latencies so far."""
-        self.latencies_ms = {drone: [] for drone in self._ids}
+        """Forgets the answers so far."""
+        self.answers = {drone: [] for drone in self._ids}
 
 
 class ZenohEar(FloorEar):

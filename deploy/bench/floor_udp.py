@@ -37,7 +37,7 @@ def main() -> int:
                 payload = opened.recv(MAX_DATAGRAM)
             except TimeoutError:
                 continue
-            answer = hop.hear(payload, clock)
+            answer = hop.hear(payload, clock(), clock)
             if answer is not None:
                 publish(answer)
     return 0

@@ -35,8 +35,9 @@ class AnsweringInbox(Inbox):
     def put(self, key: str, payload: bytes) -> None:
         """See `Inbox.put`; every subscription calls it on a thread of its own."""
         del key
+        arrival_ns = self._now()
         with self._turn:
-            answer = self._hop.hear(payload, self._now)
+            answer = self._hop.hear(payload, arrival_ns, self._now)
         if answer is not None:
             self._publish(answer)
 

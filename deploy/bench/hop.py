@@ -1,6 +1,6 @@
 """One node of the floor: the least that still passes a hand on from node to node in the order of the formation.
 
-A bare node decodes a 32-byte header, waits until the same hand sample has come through all of its references,
+A bare node decodes a 48-byte header, waits until the same hand sample has come through all of its references,
 and publishes as many bytes as an agent would. No control, no numpy, no MessagePack.
 """
 
@@ -13,7 +13,7 @@ from shared.clock import Clock
 HAND_ID = 0
 """Number of the hand among the nodes; drones have theirs."""
 
-_HEADER = struct.Struct("<4Q")
+_HEADER = struct.Struct("<6Q")
 
 
 class Token(NamedTuple):
@@ -23,13 +23,17 @@ class Token(NamedTuple):
         node: Who sent it.
         number: The newest hand sample that came to it through every hop, counted from 1.
         hand_ns: When that sample was sent.
+        arrival_ns: When the last of what it answers to had arrived.
         stamp_ns: When this payload was sent.
+        seq: Counts the payloads of its node from 1.
     """
 
     node: int
     number: int
     hand_ns: int
+    arrival_ns: int
     stamp_ns: int
+    seq: int
 
 
 def pack(token: Token, size: int) -> bytes:
@@ -55,9 +59,9 @@ class Hop:
         self._node = node
         self._through = dict.fromkeys(references, 0)
         self._size = size
-        self._sent = 0
+        self._sent = self._seq = 0
 
-    def hear(self, payload: bytes, clock: Clock) -> bytes | None:
+    def hear(self, payload: bytes, arrival_ns: int, clock: Clock) -> bytes | None:
         """Takes a payload in; returns the answer when it completes the inputs."""
         token = unpack(payload)
         if token.node in self._through:
@@ -66,4 +70,5 @@ class Hop:
         if number <= self._sent:
             return None
         self._sent = number
-        return pack(Token(self._node, number, token.hand_ns, clock()), self._size)
+        self._seq += 1
+        return pack(Token(self._node, number, token.hand_ns, arrival_ns, clock(), self._seq), self._size)

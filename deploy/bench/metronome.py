@@ -22,4 +22,4 @@ def tick(publish: Publish, size: int, rate_hz: float, clock: Clock, stopping: th
     while not stopping.wait(max(0.0, start + number / rate_hz - time.monotonic())):
         number += 1
         now = clock()
-        publish(pack(Token(HAND_ID, number, now, now), size))
+        publish(pack(Token(HAND_ID, number, now, now, now, number), size))

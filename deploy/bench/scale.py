@@ -1,25 +1,30 @@
-"""`bench scale`: many agents on this machine, and what each of them costs against a bare node.
+"""`bench scale`: many agents on this machine, what each costs against a bare node, and how many are on time.
 
 Real and bare swarms of the same formation take turns. A bare node has the links and subscriptions of an agent
-and sends payloads of the same size at the same rate; the vehicle's link it does not have.
+and sends payloads of the same size at the same rate; the vehicle's link it does not have. Then both look, in
+turns, for the largest swarm of their kind that is on time at the rate of the hand.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
-from attrs import frozen
+from attrs import asdict, frozen
 
 from deploy.bench.comb import comb
 from deploy.bench.figures import spread
 from deploy.bench.flight_ear import FlightEar
 from deploy.bench.floor_ear import FloorEar
-from deploy.bench.report import Json, Report, Sheet
+from deploy.bench.reach import LOST, Ladder, Punctuality, climb, of_agents, of_bare
+from deploy.bench.report import Json, Report
+from deploy.bench.scale_sheets import cost_sheet, draw_scale, punctuality_sheet, reach_sheet
 from deploy.bench.swarm import BenchError, Phase, fly, fly_bare_zenoh
 from observer.agent_log import AgentSummary
 from shared.config import load_scenario
 from shared.formation import Formation, build_formation
 from shared.nodes import DRONE, neighbours
 from shared.scenario import Scenario
+
+AGENTS, BARE = "agents", "bare nodes"
 
 
 @frozen(kw_only=True)
@@ -37,6 +42,7 @@ def measure(
     agents: Sequence[int],
     seconds: float,
     rounds: int,
+    largest: int = 0,
     scenario: str = "grid",
     overrides: Sequence[str] = (),
     say: Callable[[str], None] = lambda _: None,
@@ -47,6 +53,7 @@ def measure(
         agents: The sizes.
         seconds: How long each swarm is measured, all rounds together.
         rounds: How often real and bare take turns.
+        largest: Largest swarm to try when looking for how many are on time; 0: do not look.
         scenario: What flies; its formation becomes a comb of that size.
         overrides: Further `key=value` items.
         say: Told what is going on.
@@ -56,10 +63,10 @@ def measure(
         BenchError: Somebody ended or did not come, in the first swarm.
     """
     records: list[Json] = []
+    sizes: dict[int, int] = {}
     for number in agents:
-        settings = load_scenario(scenario, (*comb(number), *overrides))
-        formation = build_formation(settings, scenario)
-        turns = []
+        settings, formation = _swarm(number, scenario, overrides)
+        turns: list[Turn] = []
         try:
             for turn in range(rounds):
                 say(f"{number} agents, round {turn + 1} of {rounds}")
@@ -70,12 +77,75 @@ def measure(
             say(f"{number} agents: {error}; the curve ends before them")
             break
         records.append(_record(settings, formation, turns))
+        sizes = turns[-1].ear.payload_bytes
+    sheets = [punctuality_sheet(records), cost_sheet(records)]
+    found: list[Json] = []
+    if largest:
+        found = [
+            _reach(
+                records, sizes, seconds, largest, partial(_swarm, scenario=scenario, overrides=overrides), say
+            )
+        ]
+        sheets.append(reach_sheet(found[0]))
     return Report(
         name="scale",
-        records=tuple(records),
-        sheets=(_punctuality(records), _cost(records)),
-        draw=lambda figure: _draw(figure, records),
+        records=(*records, *found),
+        sheets=tuple(sheets),
+        draw=lambda figure: draw_scale(figure, records),
     )
+
+
+def _swarm(number: int, scenario: str, overrides: Sequence[str]) -> tuple[Scenario, Formation]:
+    settings = load_scenario(scenario, (*comb(number), *overrides))
+    return settings, build_formation(settings, scenario)
+
+
+def _reach(
+    records: Sequence[Json],
+    sizes: Mapping[int, int],
+    seconds: float,
+    largest: int,
+    swarm: Callable[[int], tuple[Scenario, Formation]],
+    say: Callable[[str], None],
+) -> Json:
+    """Looks for the largest swarms that are on time, from what has been measured on."""
+    usual = max(size for node, size in sizes.items() if node)
+    ladders = {AGENTS: Ladder(largest), BARE: Ladder(largest)}
+    tried: list[Json] = []
+
+    def note(kind: str, number: int, punctuality: Punctuality) -> None:
+        ladders[kind].tried[number] = punctuality.keeps_up
+        tried.append({"kind": kind, "n": number, **asdict(punctuality)})
+
+    def probe(kind: str, number: int) -> None:
+        say(f"{number} {kind}: are they on time?")
+        settings, formation = swarm(number)
+        try:
+            if kind == AGENTS:
+                flight, phase = fly(settings, formation, seconds)
+                punctuality = of_agents(flight.stats.agents(), settings.rates.control_hz)
+            else:
+                payloads = {0: sizes[0], **dict.fromkeys(formation.ids, usual)}
+                ear, phase = fly_bare_zenoh(settings, formation, payloads, seconds)
+                punctuality = of_bare(list(ear.answers.values()), settings.rates.hand_hz)
+        except BenchError as error:
+            say(f"{number} {kind}: {error}")
+            note(kind, number, LOST)
+        else:
+            note(kind, number, punctuality if phase.ready else LOST)
+
+    for record in records:
+        note(AGENTS, record["agents"], Punctuality(**record["punctuality"]))
+        note(BARE, record["agents"], Punctuality(**record["bare_punctuality"]))
+    climb(ladders, probe)
+    agents, bare = (ladders[kind].reached for kind in (AGENTS, BARE))
+    return {
+        "agents_on_time": agents,
+        "bare_on_time": bare,
+        "on_time_ratio": agents / bare if bare else None,
+        "largest": largest,
+        "tried": tried,
+    }
 
 
 def _take_turn(settings: Scenario, formation: Formation, seconds: float) -> Turn:
@@ -92,6 +162,8 @@ def _take_turn(settings: Scenario, formation: Formation, seconds: float) -> Turn
 def _record(settings: Scenario, formation: Formation, turns: Sequence[Turn]) -> Json:
     summaries = [summary for turn in turns for summary in turn.flight.stats.agents()]
     seconds = sum(turn.real.seconds for turn in turns)
+    punctuality = of_agents(summaries, settings.rates.control_hz)
+    answers = [tokens for turn in turns for tokens in turn.ear.answers.values()]
     agent = _per_drone([turn.real for turn in turns])
     bare = _per_drone([turn.bare for turn in turns])
     last = formation.ids[formation.levels[-1][-1]]
@@ -100,13 +172,13 @@ def _record(settings: Scenario, formation: Formation, turns: Sequence[Turn]) -> 
     return {
         "agents": len(formation.ids),
         "seconds": seconds,
-        "on_time": _on_time(summaries),
+        "on_time": punctuality.on_time,
         "rate_hz": sum(s.rate_hz for s in summaries) / len(summaries),
         "cpu_cores": _cores([turn.real for turn in turns]),
         "cpu_per_agent_ratio": agent["cpu"] / bare["cpu"] if bare["cpu"] else None,
         "rss_mb": agent["rss_mb"],
         "on_time_worst": min(s.on_time for s in summaries),
-        "hand_used": sum(s.hand_used for s in summaries) / len(summaries),
+        "hand_used": punctuality.used,
         "hand_used_worst": min(s.hand_used for s in summaries),
         "ready": all(turn.real.ready for turn in turns),
         "latency_p50_ms": spread(latencies).p50 if latencies else None,
@@ -115,17 +187,13 @@ def _record(settings: Scenario, formation: Formation, turns: Sequence[Turn]) -> 
         "wakeups_per_s": agent["wakeups_per_s"],
         "bare_cpu_per_node": bare["cpu"],
         "bare_wakeups_per_s": bare["wakeups_per_s"],
+        "punctuality": asdict(punctuality),
+        "bare_punctuality": asdict(of_bare(answers, settings.rates.hand_hz)),
         "bare_rate_hz": sent_bare / len(formation.ids) / sum(turn.bare.seconds for turn in turns),
         "cpu_ratio_by_round": [
             _per_drone([turn.real])["cpu"] / cpu for turn in turns if (cpu := _per_drone([turn.bare])["cpu"])
         ],
     }
-
-
-def _on_time(summaries: Sequence[AgentSummary]) -> float:
-    """Returns the fraction of all steps of all agents that were on time."""
-    received = [s.steps - s.missed for s in summaries]
-    return sum(s.on_time * n for s, n in zip(summaries, received, strict=True)) / max(sum(received), 1)
 
 
 def _heard_per_s(settings: Scenario, formation: Formation, summaries: Sequence[AgentSummary]) -> float:
@@ -155,59 +223,3 @@ def _cores(phases: Sequence[Phase]) -> float:
     return sum(usage.cpu_s for phase in phases for usage in phase.usage.values()) / sum(
         p.seconds for p in phases
     )
-
-
-def _punctuality(records: Sequence[Json]) -> Sheet:
-    return Sheet(
-        title="Punctuality by number of agents (worst agent in brackets)",
-        columns=("agents", "seconds", "Hz", "on time", "hand samples used", "latency p50, ms", "cores"),
-        rows=tuple(
-            (
-                str(r["agents"]),
-                f"{r['seconds']:.0f}",
-                f"{r['rate_hz']:.1f}",
-                f"{r['on_time']:.1%} ({r['on_time_worst']:.1%})",
-                f"{r['hand_used']:.1%} ({r['hand_used_worst']:.1%})",
-                "-" if r["latency_p50_ms"] is None else f"{r['latency_p50_ms']:.1f}",
-                f"{r['cpu_cores']:.2f}",
-            )
-            for r in records
-        ),
-    )
-
-
-def _cost(records: Sequence[Json]) -> Sheet:
-    return Sheet(
-        title="Cost of one agent; a bare node hears and sends the same",
-        columns=("agents", "heard/s", "core", "bare", "ratio", "by round", "wake-ups/s", "bare", "MB"),
-        rows=tuple(
-            (
-                str(r["agents"]),
-                f"{r['heard_per_s']:.0f}",
-                f"{r['cpu_per_agent']:.1%}",
-                f"{r['bare_cpu_per_node']:.1%}",
-                "-" if r["cpu_per_agent_ratio"] is None else f"{r['cpu_per_agent_ratio']:.2f}",
-                " ".join(f"{ratio:.2f}" for ratio in r["cpu_ratio_by_round"]),
-                f"{r['wakeups_per_s']:.0f}",
-                f"{r['bare_wakeups_per_s']:.0f}",
-                f"{r['rss_mb']:.0f}",
-            )
-            for r in records
-        ),
-    )
-
-
-def _draw(figure: Any, records: Sequence[Json]) -> None:
-    left, middle, right = figure.subplots(1, 3)
-    number = [r["agents"] for r in records]
-    left.plot(number, [100.0 * r["on_time"] for r in records], marker="o", label="on time")
-    left.plot(number, [100.0 * r["hand_used"] for r in records], marker="s", label="hand samples used")
-    left.set(xlabel="agents", ylabel="share, %", ylim=(0.0, 105.0))
-    middle.plot(number, [100.0 * r["cpu_per_agent"] for r in records], marker="o", label="agent")
-    middle.plot(number, [100.0 * r["bare_cpu_per_node"] for r in records], marker="s", label="bare node")
-    middle.set(xlabel="agents", ylabel="one process, % of a core", ylim=(0.0, None))
-    right.plot(number, [r["heard_per_s"] for r in records], marker="o", label="messages heard")
-    right.plot(number, [r["wakeups_per_s"] for r in records], marker="s", label="wake-ups")
-    right.set(xlabel="agents", ylabel="per agent and second", ylim=(0.0, None))
-    for axes in (left, middle, right):
-        axes.legend()

@@ -136,10 +136,20 @@ _KINDS = {
     ),
     "step": Kind("one control step, decoding included", "--n 3000", "rhombus", (_number("3000"),)),
     "scale": Kind(
-        "many agents: punctuality, CPU against a bare node, memory",
+        "many agents: punctuality, CPU against a bare node, memory; how many are on time, against bare nodes",
         "--agents 4,8,16",
         "grid",
-        (_sizes("agents", "4,8,16,32"), _seconds("10"), _rounds("2")),
+        (
+            _sizes("agents", "4,8,16,32"),
+            _seconds("10"),
+            _rounds("2"),
+            _option(
+                "largest",
+                whole(0, MAX_DRONE_ID),
+                "96",
+                "largest swarm tried to find how many are on time; 0: none",
+            ),
+        ),
     ),
     "lockstep": Kind(
         "the simulators against real time",

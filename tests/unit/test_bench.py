@@ -43,11 +43,11 @@ needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="re
 
 
 def sent(node: int, number: int) -> bytes:
-    return pack(Token(node, number, 1000 * number, 0), 64)
+    return pack(Token(node, number, 1000 * number, 0, 0, number), 64)
 
 
 def answer(hop: Hop, node: int, number: int) -> Token | None:
-    payload = hop.hear(sent(node, number), lambda: 77)
+    payload = hop.hear(sent(node, number), 66, lambda: 77)
     return None if payload is None else unpack(payload)
 
 
@@ -56,18 +56,18 @@ def test_a_bare_node_answers_when_all_references_have_passed_the_sample_on() -> 
     assert answer(hop, HAND_ID, 1) is None
     assert answer(hop, 2, 1) is None
     assert answer(hop, 1, 1) is None
-    assert answer(hop, 3, 1) == Token(4, 1, 1000, 77)
+    assert answer(hop, 3, 1) == Token(4, 1, 1000, 66, 77, 1)
     assert answer(hop, 3, 1) is None
 
 
 def test_one_lost_sample_costs_a_bare_node_one_answer() -> None:
     hop = Hop(4, (2, 3), 500)
     heard = [(2, 1), (3, 1), (2, 2), (2, 3), (3, 3), (2, 4), (3, 4)]
-    answers = [token.number for node, number in heard if (token := answer(hop, node, number))]
-    assert answers == [1, 3, 4]
+    answers = [(token.number, token.seq) for node, number in heard if (token := answer(hop, node, number))]
+    assert answers == [(1, 1), (3, 2), (4, 3)]
 
 
-@given(size=st.integers(32, 4096), token=st.builds(Token, *[st.integers(0, 2**64 - 1)] * 4))
+@given(size=st.integers(48, 4096), token=st.builds(Token, *[st.integers(0, 2**64 - 1)] * 6))
 def test_a_payload_of_the_floor_has_the_size_asked_for(size: int, token: Token) -> None:
     payload = pack(token, size)
     assert len(payload) == size
