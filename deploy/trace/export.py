@@ -21,9 +21,11 @@ def main(*, run: Path, foxglove: Path | None, csv: Path | None) -> int:
             written = export_foxglove(trace, foxglove)
             print(f"{foxglove}: {written} messages")
         if csv is not None:
-            tables = export_csv(trace, csv)
+            tables, left_out = export_csv(trace, csv)
             written += len(tables) - 1
             print(f"{csv}: {len(tables)} tables")
+            if left_out:
+                print(f"{csv}: {left_out} or more columns that somebody made up were left out")
     except OSError as error:
         raise ConfigError(f"the export cannot be written: {error}") from error
     for fault in trace.faults:

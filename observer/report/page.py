@@ -9,6 +9,7 @@ import numpy as np
 
 from observer.report.record import FlightRecord
 from observer.report.tables import FleetRow
+from shared.plain_text import plain
 
 _HEADINGS = {
     "path": "path, m",
@@ -60,8 +61,8 @@ def page(flights: Sequence[FlightRecord], rows: Mapping[str, FleetRow], shown: S
         shown: The figures, in order.
     """
     first = flights[0]
-    title = f"Flight {escape(first.name)}"
-    about = f"{len(first.ids)} drones, {first.t[-1]:.1f} s in formation, read from a {escape(first.source)}"
+    title = f"Flight {_text(first.name)}"
+    about = f"{len(first.ids)} drones, {first.t[-1]:.1f} s in formation, read from a {_text(first.source)}"
     return "\n".join(
         (
             "<!doctype html>",
@@ -69,7 +70,7 @@ def page(flights: Sequence[FlightRecord], rows: Mapping[str, FleetRow], shown: S
             '<meta name="viewport" content="width=device-width">',
             f"<title>{title}</title><style>{_LOOK}</style></head><body>",
             f"<h1>{title}</h1><p>{about}.</p>",
-            *(f'<p class="absent">{escape(remark)}</p>' for remark in first.remarks),
+            *(f'<p class="absent">{_text(remark)}</p>' for remark in first.remarks),
             "<h2>Fleet</h2>",
             fleet_table(rows),
             f"<p>{_FLEET}</p>",
@@ -81,7 +82,7 @@ def page(flights: Sequence[FlightRecord], rows: Mapping[str, FleetRow], shown: S
 
 def fleet_table(rows: Mapping[str, FleetRow]) -> str:
     """Returns the fleet table as HTML: one row per flight, and their mean if there are several."""
-    lines = {escape(name): attrs.astuple(row) for name, row in rows.items()}
+    lines = {_text(name): attrs.astuple(row) for name, row in rows.items()}
     if len(lines) > 1:
         lines["<strong>mean</strong>"] = tuple(np.nanmean(list(lines.values()), axis=0).tolist())
     head = "".join(f"<th>{_HEADINGS[field.name]}</th>" for field in attrs.fields(FleetRow))
@@ -90,6 +91,11 @@ def fleet_table(rows: Mapping[str, FleetRow]) -> str:
         for name, values in lines.items()
     )
     return f"<table><tr><th>flight</th>{head}</tr>\n{body}\n</table>"
+
+
+def _text(name: str) -> str:
+    """Returns a name as a page can show it."""
+    return escape(plain(name))
 
 
 def _number(value: float) -> str:

@@ -16,12 +16,14 @@ from shared.errors import ConfigError
 from shared.formation import Formation, build_formation
 from shared.geometry import hull_area
 from shared.messages import MAX_POSITION, NO_HAND, DroneState, HandSample, Message, Mode, PatternEvent
+from shared.plain_text import plain
 from shared.recordings.check import check
 from shared.recordings.track import Found, Vec
 from shared.scenario import Avoidance
 
 FORMED = (Mode.FOLLOW, Mode.HOLD)
 _LATEST_NS = 2**63 - 1
+_LONGEST_NAME = 40
 
 M = TypeVar("M", HandSample, DroneState)
 
@@ -203,7 +205,7 @@ def _played(events: Sequence[PatternEvent], start_ns: int, end_ns: int) -> tuple
     return tuple(
         Played(
             (event.started_ns - start_ns) / NS_PER_S,
-            event.pattern,
+            plain(event.pattern, _LONGEST_NAME),
             max(0.0, ((event.finished_ns or event.stamp_ns) - event.started_ns) / NS_PER_S),
         )
         for event in sorted(ended, key=lambda event: event.started_ns)

@@ -34,13 +34,25 @@ def write_report(flights: Sequence[FlightRecord], folder: Path) -> Path:
     """
     folder.mkdir(parents=True, exist_ok=True)
     shown = [_write_figure(drawing, flights, folder) for drawing in FIGURES]
-    rows = {record.name: fleet_row(record) for record in flights}
+    rows = dict(zip(_names(flights), map(fleet_row, flights), strict=True))
     names = [field.name for field in attrs.fields(FleetRow)]
     fleet = {name: [getattr(row, name) for row in rows.values()] for name in names}
     _write_csv(folder / FLEET, {"flight": list(rows), **fleet})
     path = folder / PAGE
     path.write_text(page(flights, rows, shown), encoding="utf-8")
     return path
+
+
+def _names(flights: Sequence[FlightRecord]) -> list[str]:
+    """Returns what to call flights, each in its own way: folders of the same name may hold different ones."""
+    names = list[str]()
+    for record in flights:
+        name, number = record.name, 1
+        while name in names:
+            number += 1
+            name = f"{record.name} ({number})"
+        names.append(name)
+    return names
 
 
 def _write_figure(drawing: Drawing, flights: Sequence[FlightRecord], folder: Path) -> Shown:

@@ -28,6 +28,7 @@ _LONGEST = 1 << 40
 _SURE = 3
 """So many records after each other are no accident."""
 _BLOCK = 1 << 20
+_LONGEST_NAME = 4096
 
 
 class Located(NamedTuple):
@@ -195,6 +196,8 @@ def read_channel(content: bytes) -> ChannelRecord:
         number = int.from_bytes(content[:2], "little")
         topic, at = _text(content, 4)
         encoding, _ = _text(content, at)
+        if len(topic) + len(encoding) > _LONGEST_NAME:
+            raise DamageError("a topic with a name that is none")
     except (struct.error, UnicodeDecodeError) as error:
         raise DamageError(str(error)) from error
     return ChannelRecord(number, topic, encoding)

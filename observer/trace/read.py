@@ -28,7 +28,7 @@ MOST_IN_MEMORY = 4_000_000
 """Messages that whoever needs all of them at once takes: a quarter of an hour of 64 drones."""
 
 ENCODING = "msgpack"
-_MOST_METADATA = 100
+_MOST_METADATA = 20
 _MOST_NAMED = 10
 _LONGEST_COUNT = 20
 _RETIRED = (("net", "pointer_port"),)

@@ -36,6 +36,7 @@ _LABEL = Color(0.80, 0.80, 0.80)
 
 _BODY_SIZE, _GOAL_SIZE, _HAND_SIZE = 0.10, 0.05, 0.14
 _LABEL_HEIGHT = 0.15
+_MOST_STRANGERS = 16
 
 
 class Scene:
@@ -52,13 +53,19 @@ class Scene:
         self._box = tuple(tuple(map(float, corner)) for corner in fence_box(scenario, formation))
         self._hand: HandSample | None = None
         self._drones: dict[int, DroneState] = {}
+        self._own = set(formation.ids)
 
     def add(self, message: Message) -> None:
         """Takes a message; only the newest of the hand and of each drone counts."""
         if isinstance(message, HandSample):
             self._hand = message
-        elif isinstance(message, DroneState):
+        elif isinstance(message, DroneState) and self._has_room(message.id):
             self._drones[message.id] = message
+
+    def _has_room(self, drone: int) -> bool:
+        """Says whether a drone is shown: those of the formation, and a few that anybody may have made up."""
+        most = len(self._own) + _MOST_STRANGERS
+        return drone in self._drones or drone in self._own or len(self._drones) < most
 
     def surroundings(self, stamp_ns: int) -> SceneUpdate:
         """Returns what never moves: fence, columns and the zones in which they act."""

@@ -2,63 +2,84 @@
 
 import csv
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from observer.trace.read import Trace
 from shared.clock import NS_PER_S
+from shared.formation import build_formation
 from shared.messages import Heard, Message, Seen
-from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, rank, topic_of
+from shared.scenario import Scenario
+from shared.spreadsheet import cell
+from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, TOPICS, parse_key, rank, topic_of
 
 ALIGNED = "aligned.csv"
 """Name of the table with everything side by side."""
 
 _PERIOD_NS = round(NS_PER_S / HAND.rate_hz)
 _SIDE_BY_SIDE = (HAND, DRONE_STATE, FORMATION_STATE, PATTERN)
+_LONGEST_CURRENT_S = max(topic.stale_s for topic in TOPICS if topic in _SIDE_BY_SIDE)
+"""After this long without a message nothing is current."""
 _TECHNICAL = (
     *("log_ns", "epoch", "seq", "stamp_ns", "id", "step_ns", "signature", "heard", "missing"),
     *("unheard", "lost"),
 )
+_OWN_COLUMNS, _COLUMNS_PER_DRONE = 256, 8
+"""Columns that a table has at most: what a message says itself, and what it says of each drone (the distance to
+it, three numbers of its sample that was heard)."""
+_KEPT_ROWS = 4096
+"""Rows that wait in memory; a table for every key would be more open files than a process may have."""
 
 Row = dict[str, Any]
 
 
-def export_csv(trace: Trace, folder: Path) -> list[Path]:
+class Exported(NamedTuple):
+    """What was written.
+
+    Attributes:
+        files: The tables.
+        left_out: Columns for which there was no room: whoever sends makes up the names of some.
+    """
+
+    files: list[Path]
+    left_out: int
+
+
+def export_csv(trace: Trace, folder: Path) -> Exported:
     """Writes the tables.
 
     `<key with dashes>.csv` has one row per valid message, with the names of its fields; vectors become `_x`,
     `_y`, `_z`, maps `field.key`. `aligned.csv` has 60 rows per second of the recorder's clock: `time_s`
     since the first message, and what was then the newest of hand, drones, formation and glove, left empty where
-    it is older than its topic allows; a pattern event stands in the one row in which it came.
+    it is older than its topic allows; there are no rows for times in which all of it is. A pattern event stands
+    in the one row in which it came.
 
     Args:
         trace: What to write; it is read twice, and never held in memory.
         folder: Where; created if missing, tables that exist are replaced.
 
     Returns:
-        The files.
+        What was written.
 
     Raises:
         OSError: They cannot be written.
     """
-    columns = _columns(trace)
-    chosen = {key: _chosen(key, names) for key, names in columns.items() if topic_of(key) in _SIDE_BY_SIDE}
+    columns, left_out = _columns(trace)
+    own = set(build_formation(trace.scenario).ids)
+    chosen = {key: _chosen(key, names) for key, names in columns.items() if _is_side_by_side(key, own)}
     folder.mkdir(parents=True, exist_ok=True)
-    with ExitStack() as files:
-        tables = {
-            key: _Table(files, folder / f"{key.replace('/', '-')}.csv", list(names))
-            for key, names in columns.items()
-        }
-        together = [name for names in chosen.values() for name in names.values()]
-        aligned = _Table(files, folder / ALIGNED, ["time_s", *together])
-        moments = _Moments(chosen)
-        for key, log_ns, row in _rows(trace):
-            tables[key].write(row)
-            for moment in moments.until(log_ns):
-                aligned.write(moment)
-            moments.add(key, log_ns, row)
-    return [table.path for table in (*tables.values(), aligned)]
+    together = [name for names in chosen.values() for name in names.values()]
+    tables = _Tables(folder)
+    for key, names in columns.items():
+        tables.begin(f"{key.replace('/', '-')}.csv", list(names))
+    tables.begin(ALIGNED, ["time_s", *together])
+    moments = _Moments(chosen)
+    for key, log_ns, row in _rows(trace):
+        tables.write(f"{key.replace('/', '-')}.csv", row)
+        for moment in moments.until(log_ns):
+            tables.write(ALIGNED, moment)
+        moments.add(key, log_ns, row)
+    return Exported(tables.finish(), left_out)
 
 
 def flatten(message: Message) -> Row:
@@ -69,17 +90,41 @@ def flatten(message: Message) -> Row:
     return cells
 
 
-class _Table:
-    """One CSV file."""
+class _Tables:
+    """CSV files that grow side by side; none stays open.
 
-    def __init__(self, files: ExitStack, path: Path, columns: Sequence[str]) -> None:
-        self.path = path
-        stream = files.enter_context(path.open("w", newline="", encoding="utf-8"))
-        self._writer = csv.DictWriter(stream, columns, restval="")
-        self._writer.writeheader()
+    Args:
+        folder: Where they are.
+    """
 
-    def write(self, row: Row) -> None:
-        self._writer.writerow(row)
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._columns: dict[str, list[str]] = {}
+        self._waiting: dict[str, list[list[object]]] = {}
+        self._count = 0
+
+    def begin(self, name: str, columns: Sequence[str]) -> None:
+        """Makes a new file with a header."""
+        self._columns[name] = list(columns)
+        self._append(name, [[cell(column) for column in columns]], "w")
+
+    def write(self, name: str, row: Row) -> None:
+        """Adds a row; a cell that it does not have is empty, and one of no column is left out."""
+        self._waiting.setdefault(name, []).append([cell(row.get(column, "")) for column in self._columns[name]])
+        self._count += 1
+        if self._count >= _KEPT_ROWS:
+            self.finish()
+
+    def finish(self) -> list[Path]:
+        """Writes what waits; returns the files."""
+        for name, rows in self._waiting.items():
+            self._append(name, rows, "a")
+        self._waiting, self._count = {}, 0
+        return [self._folder / name for name in self._columns]
+
+    def _append(self, name: str, rows: list[list[object]], mode: str) -> None:
+        with (self._folder / name).open(mode, newline="", encoding="utf-8") as stream:
+            csv.writer(stream).writerows(rows)
 
 
 class _Moments:
@@ -106,8 +151,12 @@ class _Moments:
             )
 
     def until(self, log_ns: int) -> Iterator[Row]:
-        """Yields the moments before a time that have not been yielded."""
+        """Yields the moments before a time that have not been yielded and in which anything was current."""
         while self._first_ns is not None and (now_ns := self._first_ns + self._count * _PERIOD_NS) < log_ns:
+            newest_ns = max((seen_ns for seen_ns, _ in self._newest.values()), default=0)
+            if now_ns - newest_ns > _LONGEST_CURRENT_S * NS_PER_S:
+                self._count += -(-(log_ns - now_ns) // _PERIOD_NS)
+                return
             moment = {"time_s": f"{self._count / HAND.rate_hz:.6f}"}
             for key, (seen_ns, cells) in list(self._newest.items()):
                 stale_s = topic_of(key).stale_s
@@ -124,12 +173,32 @@ def _rows(trace: Trace) -> Iterator[tuple[str, int, Row]]:
         yield record.key, record.log_ns, {"log_ns": record.log_ns, **flatten(message)}
 
 
-def _columns(trace: Trace) -> dict[str, dict[str, None]]:
-    """Returns the columns of every key, in the order of first appearance; the keys are sorted."""
+def _columns(trace: Trace) -> tuple[dict[str, dict[str, None]], int]:
+    """Returns the columns of every key, in the order of first appearance, and how many are left out.
+
+    The keys are sorted.
+    """
+    most = most_columns(trace.scenario)
     columns: dict[str, dict[str, None]] = {}
+    left_out: set[str] = set()
     for key, _, row in _rows(trace):
-        columns.setdefault(key, {}).update(dict.fromkeys(row))
-    return dict(sorted(columns.items(), key=lambda item: rank(item[0])))
+        own = columns.setdefault(key, {})
+        for name in row:
+            if name not in own and len(own) >= most:
+                left_out.add(name if len(left_out) < most else "")
+            else:
+                own[name] = None
+    return dict(sorted(columns.items(), key=lambda item: rank(item[0]))), len(left_out)
+
+
+def most_columns(scenario: Scenario) -> int:
+    """Returns how many columns a table of a swarm has at most."""
+    return _OWN_COLUMNS + _COLUMNS_PER_DRONE * len(build_formation(scenario).ids)
+
+
+def _is_side_by_side(key: str, drones: set[int]) -> bool:
+    place = parse_key(key)
+    return place.topic in _SIDE_BY_SIDE and (place.topic is not DRONE_STATE or place.id in drones)
 
 
 def _chosen(key: str, columns: dict[str, None]) -> dict[str, str]:

@@ -28,7 +28,7 @@ from shared.messages import DroneState, HandSample, Message, Mode, PatternEvent
 from shared.scenario import Clip, Hand, Obstacle
 from shared.topics import DRONE_STATE, HAND, PATTERN
 from shared.transport import Arrival
-from tests.synthetic_swarm import MS, TICK, fly
+from tests.synthetic_swarm import MS, T0, TICK, fly
 
 SCENARIO = load_scenario("rhombus")
 FORMATION = build_formation(SCENARIO)
@@ -148,11 +148,11 @@ def test_what_a_flight_lacks_is_said_instead_of_drawn(tmp_path: Path) -> None:
 
 
 def test_several_flights_have_a_row_each_and_a_mean(tmp_path: Path) -> None:
-    slow = evolve(STRAIGHT, name="slow", position=STRAIGHT.position * 0.5)
+    slow = evolve(STRAIGHT, position=STRAIGHT.position * 0.5)  # of the same name, from another folder
     text = write_report([STRAIGHT, slow], tmp_path).read_text()
     assert f"<td>{SPEED * T[-1] * 0.75:.4f}</td>" in text
     with (tmp_path / "fleet.csv").open(newline="") as file:
-        assert [row["flight"] for row in csv.DictReader(file)] == ["straight <1>", "slow"]
+        assert [row["flight"] for row in csv.DictReader(file)] == ["straight <1>", "straight <1> (2)"]
 
 
 def test_every_axis_of_every_figure_says_what_it_shows() -> None:
@@ -232,6 +232,34 @@ def test_a_trace_becomes_a_record_of_the_time_in_formation(tmp_path: Path) -> No
     assert played.name == "CR"
     assert played.t == pytest.approx(0.2, abs=0.02)
     assert played.length == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("name", ["$\\frac{$", "a\0b", "<b>&", "_x", "模式", "x" * 200, "=1+1", "\x1b[2J"])
+def test_a_name_is_shown_as_it_is_whatever_it_is(tmp_path: Path, name: str) -> None:
+    felt = [
+        PatternEvent(
+            epoch=1,
+            seq=seq,
+            stamp_ns=T0 + 60 * TICK,
+            pattern=pattern,
+            outcome="finished",
+            state_seq=0,
+            started_ns=T0 + 50 * TICK,
+            finished_ns=T0 + 60 * TICK,
+        )
+        for seq, pattern in enumerate([name, *(f"made up {n}" for n in range(200))])
+    ]
+    folder = tmp_path / name.replace("\0", "").replace("/", "")
+    record = open_record(write_trace(folder, [*fly(300), *felt]))
+    page = write_report([evolve(record, name=name)], tmp_path / "report")
+    text = page.read_text(encoding="utf-8")
+    assert "\0" not in text
+    assert "\x1b" not in text
+    ElementTree.parse(page.parent / "patterns.svg")  # noqa: S314  our own file
+    with (page.parent / "patterns.csv").open(newline="", encoding="utf-8") as file:
+        patterns = [row["pattern"] for row in csv.DictReader(file)]
+    assert len(patterns) == 201
+    assert not any(pattern.startswith("=") for pattern in patterns)
 
 
 def test_what_cannot_be_reported_is_refused_with_the_reason(

@@ -179,7 +179,7 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 
 def test_a_table_per_key_holds_every_message(tmp_path: Path) -> None:
     trace = trace_of(tmp_path, everything())
-    names = [path.name for path in export_csv(trace, tmp_path / "tables")]
+    names = [path.name for path in export_csv(trace, tmp_path / "tables").files]
     assert names == [
         "human-hand.csv",
         "drone-1-state.csv",

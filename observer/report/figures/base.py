@@ -1,5 +1,6 @@
 """What the figures of a report share: their shape, their style and the view from above."""
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -35,6 +36,8 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "font.size": 9.0,
     "svg.hashsalt": "swarmtouch",
+    # Names are not ours: no dollar in one begins a formula.
+    "text.parse_math": False,
 }
 
 
@@ -63,7 +66,9 @@ class Drawing(NamedTuple):
 @contextmanager
 def style() -> Iterator[None]:
     """Draws in the report's style within the context."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(_STYLE), warnings.catch_warnings():
+        # Nor has our font every letter of them.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         yield
 
 

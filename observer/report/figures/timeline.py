@@ -1,5 +1,6 @@
 """Which pattern was felt when, beside the area of the formation."""
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from observer.colours import COLOURS, HAND
@@ -9,6 +10,8 @@ from observer.report.tables import areas
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MOST_PATTERNS = 40
+"""No set has more; of more, the most frequent are drawn."""
 SHORTEST_BAR = 0.15
 """A pattern is drawn at least so long, s, or one would not see it."""
 
@@ -19,7 +22,8 @@ def _draw(figure: "Figure", flights: Flights) -> None:
     above.plot(record.recorded_t, areas(record) / record.default_area, color=COLOURS[0], lw=1.1)
     above.axhline(1.0, color=HAND, lw=0.9, ls="--")
     above.set_ylabel("area / default area")
-    names = sorted({pattern.name for pattern in record.patterns})
+    counts = Counter(pattern.name for pattern in record.patterns)
+    names = sorted(name for name, _ in counts.most_common(MOST_PATTERNS))
     for row, name in enumerate(names):
         bars = [(p.t, max(p.length, SHORTEST_BAR)) for p in record.patterns if p.name == name]
         below.broken_barh(bars, (row - 0.35, 0.7), color=COLOURS[row % len(COLOURS)])
