@@ -63,6 +63,12 @@ class Row:
         """Whom it has refused, with what, and how often."""
         return self._audited(REFUSED)
 
+    @property
+    def rejected(self) -> dict[str, int]:
+        """How many messages it has dropped, by reason."""
+        rejected = self.heard.status.rejected if self.heard.status else {}
+        return {plain(reason): count for reason, count in rejected.items()}
+
     def _audited(self, prefix: str) -> dict[str, int]:
         metrics = self.heard.status.metrics if self.heard.status else {}
         return {

@@ -47,6 +47,7 @@ def status_json(rows: list[Row]) -> list[dict[str, Any]]:
             "cpu": row.heard.status.cpu if row.heard.status else None,
             "rss_mb": row.heard.status.rss_mb if row.heard.status else None,
             "form": row.heard.status.form if row.heard.status else None,
+            "rejected": row.rejected,
             "links": row.links,
             "refused": row.refused,
         }

@@ -17,6 +17,7 @@ from deploy.status.show import status_table as process_table
 from deploy.trace.info import complaints, link_table, print_lines, take
 from glove_bridge.bridge import Bridge
 from glove_bridge.patterns import load_patterns
+from glove_bridge.patterns.pattern import PatternSet
 from observer.console.scene import HandMap
 from observer.console.swarm_view import SwarmView
 from observer.link_stats import SwarmLinks
@@ -62,6 +63,15 @@ def _swarm() -> tuple[Scenario, Formation]:
     return scenario, build_formation(scenario)
 
 
+@cache
+def _patterns() -> tuple[PatternSet, PatternSet]:
+    return load_patterns("flight"), load_patterns("cues")
+
+
+def _bridge() -> Bridge:
+    return Bridge(*_swarm(), *_patterns(), epoch=0)
+
+
 def hear(data: bytes) -> object:
     """What the launcher, the status, the console, the bridge and the statistics make of a payload on a key."""
     name, _, payload = data.partition(SEPARATOR)
@@ -75,14 +85,15 @@ def hear(data: bytes) -> object:
     monitor.drain()
     view = SwarmView(formation, HandMap(scenario, formation), {}, frozenset(), 0)
     said = [*view.take(arrivals, _ARRIVAL_NS), view.snapshot(_ARRIVAL_NS), view.health(_ARRIVAL_NS)]
-    bridge = Bridge(scenario, formation, load_patterns("flight"), load_patterns("cues"), epoch=0)
+    bridge = _bridge()
     bridge.receive(arrivals)
     bridge.step(_ARRIVAL_NS)
     take(links, key, payload, _ARRIVAL_NS)
 
     assert all(text.isprintable() for each in said for text in _texts(each)), said
+    message = decode_on(key, payload)
     _show(monitor, links)
-    return decode_on(key, payload)
+    return message
 
 
 def hear_token(data: bytes) -> object:
@@ -91,7 +102,7 @@ def hear_token(data: bytes) -> object:
     scenario, formation = _swarm()
     monitor = Monitor(bus := _Everything(), formation, lambda: _ARRIVAL_NS)
     view = SwarmView(formation, HandMap(scenario, formation), {}, frozenset(), 0)
-    bridge = Bridge(scenario, formation, load_patterns("flight"), load_patterns("cues"), epoch=0)
+    bridge = _bridge()
     for present in (True, False, True):
         view.presence_changed(token, present)
         bridge.presence_changed(token, present, _ARRIVAL_NS)

@@ -81,6 +81,15 @@ def test_the_table_and_the_json_say_the_same() -> None:
     ]
 
 
+def test_who_does_not_believe_what_it_hears_is_not_well_and_says_how_often() -> None:
+    seen = replace(status(), rejected={"jump": 3, "[/x]\x1b[31m": 1})
+    (row,) = rows_of(
+        ("drone/1",), {"drone/1": Heard(present=True, status=seen, state=drone(Flag.REJECTED_INPUT))}
+    )
+    assert row.problems == ("rejected input",)
+    assert status_json([row])[0]["rejected"] == {"jump": 3, r"[/x]\x1b[31m": 1}
+
+
 def test_who_is_linked_and_who_was_refused_is_shown_by_name_and_is_no_illness() -> None:
     audit = Audit(["relay", "drone/2"])
     audit.linked("3551f63a5eee", "relay", present=True)
