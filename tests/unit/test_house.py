@@ -43,6 +43,9 @@ PURE = [
             "geometry",
             "messages",
             "nodes",
+            "order",
+            "plain_text",
+            "plausibility",
             "pointer_link",
             "radio_link",
             "scenario",
@@ -154,3 +157,19 @@ def test_every_module_says_what_it_is() -> None:
         if p.read_text(encoding="utf-8") and not ast.get_docstring(ast.parse(p.read_text()))
     ]
     assert silent == []
+
+
+def test_one_console_shows_foreign_text_and_nobody_makes_another() -> None:
+    """`PlainConsole` takes what a terminal acts upon out of every string; those of rich do not."""
+    own = ROOT / "deploy/launcher/console.py"
+    files = [file for package in PACKAGES for file in (ROOT / package).rglob("*.py") if file != own]
+    made = {
+        f"{file.relative_to(ROOT)}:{node.lineno}"
+        for file in files
+        if "from rich" in (source := file.read_text(encoding="utf-8"))
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in ("Console", "Text")
+    }
+    assert not made
