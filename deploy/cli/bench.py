@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     from deploy.bench.machine import Conditions  # noqa: PLC0415  --help must not load numpy
     from deploy.bench.plot import check_plot, save_plot  # noqa: PLC0415
     from deploy.bench.report import print_report, split_at_block, write_block  # noqa: PLC0415
-    from deploy.launcher.console import open_console  # noqa: PLC0415
+    from deploy.terminal.console import open_console  # noqa: PLC0415
 
     if arguments.plot:
         check_plot(arguments.plot)

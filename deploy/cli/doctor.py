@@ -20,7 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     from deploy.doctor.examine import examine  # noqa: PLC0415  --help must not load the bus
     from deploy.doctor.finding import Verdict  # noqa: PLC0415
     from deploy.doctor.show import findings_table  # noqa: PLC0415
-    from deploy.launcher.console import open_console  # noqa: PLC0415
+    from deploy.terminal.console import open_console  # noqa: PLC0415
     from shared.config import load_scenario  # noqa: PLC0415
 
     findings = list(examine(load_scenario(arguments.scenario, arguments.overrides)))

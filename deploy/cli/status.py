@@ -27,9 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Looks and returns the exit code."""
-    from deploy.launcher.console import open_console  # noqa: PLC0415  --help must not load the bus
     from deploy.status.listen import listen  # noqa: PLC0415
     from deploy.status.show import audit_table, status_json, status_table  # noqa: PLC0415
+    from deploy.terminal.console import open_console  # noqa: PLC0415  --help must not load the bus
     from observer.swarm import running_scenario  # noqa: PLC0415
 
     scenario = running_scenario(arguments.run, arguments.overrides)

@@ -6,7 +6,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from deploy.launcher.console import open_console
+from deploy.terminal.console import open_console
 from glove_bridge.distinctiveness import Prediction, predict
 from glove_bridge.patterns import load_patterns, shipped_sets
 from glove_bridge.patterns.pattern import Frame, Pattern, PatternSet

@@ -13,11 +13,11 @@ from typing import Protocol
 from attrs import frozen
 
 from agents.control.modes import HAND_LAND
-from deploy.launcher.job_control import has_shell, stop_here, watch_signals
-from deploy.launcher.keyboard import Keyboard
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.process_table import ProcessRow
 from deploy.launcher.supervisor import Child, Supervisor
+from deploy.terminal.job_control import has_shell, stop_here, watch_signals
+from deploy.terminal.keyboard import Keyboard
 from shared.formation import Formation
 from shared.nodes import RELAY, WORLD
 

@@ -9,11 +9,9 @@ from pathlib import Path
 from attrs import frozen
 from rich.console import Console
 
-from deploy.launcher.console import WIDTH, open_console
 from deploy.launcher.flight import Flight, Outcome
 from deploy.launcher.glove_panel import GlovePanel
 from deploy.launcher.hand_choice import HandChoice, choose_hand
-from deploy.launcher.job_control import in_foreground
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.pattern_file import write_pattern_file
 from deploy.launcher.ports import free_port_near, free_ports
@@ -26,8 +24,10 @@ from deploy.launcher.process_table import (
 )
 from deploy.launcher.run_directory import create_run_directory, write_run_file
 from deploy.launcher.status_view import StatusView
-from deploy.launcher.streams import PatientStream
 from deploy.launcher.summary import Json, flight_summary, print_summary
+from deploy.terminal.console import WIDTH, open_console
+from deploy.terminal.job_control import in_foreground
+from deploy.terminal.streams import PatientStream
 from glove_bridge.patterns import load_patterns
 from human_relay.sources import source_hints
 from observer.console import PORT

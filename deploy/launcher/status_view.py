@@ -13,8 +13,8 @@ from rich.table import Table
 
 from deploy.launcher.flight import Flight
 from deploy.launcher.glove_panel import GlovePanel
-from deploy.launcher.job_control import in_foreground
 from deploy.launcher.monitor import Monitor
+from deploy.terminal.job_control import in_foreground
 from shared.conditions import conditions
 from shared.messages import DroneState, ProcessStatus
 from shared.nodes import DRONE

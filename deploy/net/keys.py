@@ -7,8 +7,8 @@ from urllib.parse import urlsplit
 
 from rich.table import Table
 
-from deploy.launcher.console import open_console
 from deploy.net.authority import WARN_DAYS, create, issue, issued, remove
+from deploy.terminal.console import open_console
 from shared.config import load_scenario
 from shared.errors import ConfigError
 from shared.formation import Formation, build_formation

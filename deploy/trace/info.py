@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
-from deploy.launcher.console import open_console
+from deploy.terminal.console import open_console
 from deploy.trace.listen import listen
 from observer.link_stats import LinkSummary, SwarmLinks
 from observer.swarm import running_scenario

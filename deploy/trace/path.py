@@ -8,7 +8,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from deploy.launcher.console import open_console
+from deploy.terminal.console import open_console
 from observer.path.diagram import draw_diagram
 from observer.path.flight import RecordedFlight
 from observer.path.follow import Excess, Typical, follow, most_unusual, typical

@@ -6,7 +6,6 @@ from functools import cache
 from io import StringIO
 from typing import Any
 
-from deploy.launcher.console import PlainConsole
 from deploy.launcher.flight import Outcome
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.status_view import AgentRow, status_table
@@ -14,6 +13,7 @@ from deploy.launcher.summary import flight_summary, print_summary
 from deploy.status.report import Heard, rows_of
 from deploy.status.show import audit_table, status_json
 from deploy.status.show import status_table as process_table
+from deploy.terminal.console import PlainConsole
 from deploy.trace.info import complaints, link_table, print_lines, take
 from glove_bridge.bridge import Bridge
 from glove_bridge.patterns import load_patterns

@@ -17,8 +17,8 @@ from rich.table import Table
 
 from agents.vehicles import sim
 from agents.vehicles.link import decode_order, decode_pose, encode_order, encode_pose
-from deploy.launcher.console import PlainConsole
 from deploy.net.authority import issued
+from deploy.terminal.console import PlainConsole
 from glove_bridge.calibration_file import SHIPPED, load_calibration
 from glove_bridge.framing import StreamDecoder
 from glove_bridge.framing import decode as deframe

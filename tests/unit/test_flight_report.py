@@ -10,11 +10,11 @@ import pytest
 from msgspec.structs import replace
 from rich.console import Console
 
-from deploy.launcher.console import open_console
 from deploy.launcher.flight import GRACE_S, INTERRUPTED_LANDING_S, Outcome
 from deploy.launcher.monitor import Monitor
 from deploy.launcher.status_view import SUMMARISE_ABOVE, AgentRow, plain_lines, status_table
 from deploy.launcher.summary import Json, flight_summary, print_summary
+from deploy.terminal.console import open_console
 from human_relay.relay import IMPOSSIBLE_POSE
 from shared.clock import system_clock
 from shared.codec import encode

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from deploy.launcher.console import PlainConsole
+from deploy.terminal.console import PlainConsole
 from shared.errors import DeviceError
 from shared.plain_text import LONGEST, plain
 from shared.process import EXIT_FAILED, explain

@@ -6,7 +6,7 @@ from typing import Any, TextIO, cast
 from rich.console import Console
 from rich.text import Text
 
-from deploy.launcher.streams import PatientStream, SteadyStream
+from deploy.terminal.streams import PatientStream, SteadyStream
 from shared.plain_text import plain
 
 WIDTH = 80

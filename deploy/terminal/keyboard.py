@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from deploy.launcher.job_control import in_foreground
+from deploy.terminal.job_control import in_foreground
 
 _LOCAL_MODES = 3
 """Where `termios.tcgetattr` has the local modes."""
