@@ -16,6 +16,10 @@ SCHEMA_VERSION = 1
 MAX_POSITION: Final = 1_000.0
 MAX_VELOCITY: Final = 50.0
 MAX_DRONE_ID = 65_535
+MAX_RADIUS = 5.0
+"""Of a moving obstacle, m."""
+MAX_VALID = 60.0
+"""Longest time that a moving obstacle may claim to be where it was, s."""
 
 
 Vector = tuple[float, float, float]
@@ -177,6 +181,26 @@ class DroneState(Message, frozen=True, kw_only=True):
     unheard: tuple[DroneId, ...] = ()
     lost: tuple[Seen, ...] = ()
     step_ns: UInt64 = 0
+
+
+class ObstacleState(Message, frozen=True, kw_only=True):
+    """Something that moves among the drones and does not keep away from them: a person, a robot.
+
+    Attributes:
+        id: Number of the obstacle.
+        position: Middle of its foot in the world frame, m; it fills an upright cylinder above it.
+        velocity: World frame, m/s.
+        radius: m.
+        height: m.
+        valid_s: How long it may be relied on to be about there if nothing newer is heard, s.
+    """
+
+    id: DroneId
+    position: Position
+    velocity: Velocity
+    radius: Annotated[float, Meta(ge=0.0, le=MAX_RADIUS)]
+    height: Annotated[float, Meta(ge=0.0, le=MAX_POSITION)]
+    valid_s: Annotated[float, Meta(ge=0.0, le=MAX_VALID)]
 
 
 class FormationState(Message, frozen=True, kw_only=True):

@@ -75,7 +75,9 @@ def neighbours(scenario: Scenario, formation: Formation, drone: int) -> tuple[in
 def _linked(scenario: Scenario, formation: Formation, node: str, earlier: str) -> bool:
     if WORLD in (node, earlier):
         # The world stands for physics, not for a member: it hears the hand (as the referee) and is observed.
-        return RELAY in (node, earlier) or OBSERVER in (node, earlier)
+        # Where somebody walks in it, it says so to everybody.
+        heard = bool(scenario.walkers) and BRIDGE not in (node, earlier)
+        return heard or RELAY in (node, earlier) or OBSERVER in (node, earlier)
     if not (node.startswith("drone/") and earlier.startswith("drone/")):
         return True
     one, other = int(node.removeprefix("drone/")), int(earlier.removeprefix("drone/"))

@@ -223,11 +223,46 @@ class FormationSettings:
 
 @frozen(kw_only=True)
 class Obstacle:
-    """One entry of `[[obstacles]]`: a vertical column."""
+    """One entry of `[[obstacles]]`: a vertical column.
+
+    Attributes:
+        name: For people.
+        x: Its axis, m.
+        y: The same.
+        radius: m; absent: `avoidance.columns.radius`.
+        height: m; absent: it has no end.
+    """
 
     name: str
     x: float
     y: float
+    radius: float | None = field(default=None, validator=optional(_positive))
+    height: float | None = field(default=None, validator=optional(_positive))
+
+
+@frozen(kw_only=True)
+class Walker:
+    """One entry of `[[walkers]]`: somebody who walks among the drones, in the simulated world.
+
+    Attributes:
+        name: For people.
+        path: Corners of the way (x, y), m; walked there and back again.
+        speed: Largest speed, m/s.
+        radius: m.
+        height: m.
+        start: When the walk begins, s.
+    """
+
+    name: str
+    path: tuple[Pair, ...]
+    speed: float = field(default=1.0, validator=_positive)
+    radius: float = field(default=0.3, validator=_positive)
+    height: float = field(default=1.8, validator=_positive)
+    start: float = field(default=0.0, validator=_not_negative)
+
+    def __attrs_post_init__(self) -> None:
+        if not self.path:
+            raise ValueError("path is empty; give the corners of the way, for example [[0.0, 1.0], [2.0, 1.0]]")
 
 
 @frozen(kw_only=True)
@@ -403,6 +438,7 @@ class Scenario:
     impedance: Impedance = Impedance()
     formation: FormationSettings = FormationSettings()
     obstacles: tuple[Obstacle, ...] = ()
+    walkers: tuple[Walker, ...] = ()
     avoidance: Avoidance = Avoidance()
     vehicles: Vehicles = Vehicles()
     limits: Limits = Limits()

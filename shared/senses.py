@@ -10,11 +10,12 @@ from msgspec.structs import replace
 from shared.clock import NS_PER_S
 from shared.codec import decode
 from shared.errors import DecodeError
-from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, Wish
+from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, ObstacleState, Wish
+from shared.obstacle_watch import ObstacleWatch
 from shared.order import Sample, check_newer
 from shared.plausibility import HAND_LIMITS, Believed, MotionLimits, believe, check_possible
 from shared.signature import Verify
-from shared.topics import DRONE_STATE, HAND
+from shared.topics import DRONE_STATE, HAND, OBSTACLE, parse_key
 from shared.transport import Arrival
 
 M = TypeVar("M", bound=Message)
@@ -55,19 +56,28 @@ class Senses:
         ids: Numbers of the drones to listen to.
         verify: Checks the signature of hand samples; None accepts unsigned ones.
         bodies: What the bodies of drones can do; None believes everything, as one who only shows it does.
+        obstacles: Whether to listen to moving obstacles as well.
 
     Attributes:
         hand: Newest hand sample, None before the first.
         drones: Newest state per drone that was ever heard.
+        obstacles: What is known of moving obstacles.
         doubted_ns: When something that was not believed last came, by key (own clock).
         rejected: Dropped samples by reason.
     """
 
     def __init__(
-        self, ids: Iterable[int], verify: Verify | None = None, bodies: MotionLimits | None = None
+        self,
+        ids: Iterable[int],
+        verify: Verify | None = None,
+        bodies: MotionLimits | None = None,
+        *,
+        obstacles: bool = False,
     ) -> None:
         self.hand: Sensed[HandSample] | None = None
         self.drones: dict[int, Sensed[DroneState]] = {}
+        self.obstacles = ObstacleWatch()
+        self._hears_obstacles = obstacles
         self.rejected: Counter[str] = Counter()
         self.doubted_ns: dict[str, int] = {}
         self._verify = verify
@@ -80,7 +90,7 @@ class Senses:
     @property
     def keys(self) -> list[str]:
         """Returns the keys to subscribe to."""
-        return [_HAND_KEY, *self._ids]
+        return [_HAND_KEY, *self._ids, *((OBSTACLE.wildcard,) if self._hears_obstacles else ())]
 
     def take(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Decodes what has arrived; nothing that anyone sends raises."""
@@ -132,7 +142,8 @@ class Senses:
             return
         drone = self._ids.get(key)
         if drone is None:
-            raise DecodeError("unknown-key", key)
+            self._take_obstacle(key, payload, arrival_ns)
+            return
         state = decode(payload, DroneState)
         if state.id != drone:
             raise DecodeError("wrong-id", f"drone {state.id} on {key}")
@@ -141,6 +152,12 @@ class Senses:
         if self._bodies is not None:
             self._believe(key, sensed, self._bodies)
         self.drones[drone] = sensed
+
+    def _take_obstacle(self, key: str, payload: bytes, arrival_ns: int) -> None:
+        place = parse_key(key)
+        if place.topic is not OBSTACLE or not self._hears_obstacles:
+            raise DecodeError("unknown-key", key)
+        self.obstacles.hear(place.id, decode(payload, ObstacleState), arrival_ns)
 
     def _check_drone(self, sensed: Sensed[DroneState]) -> None:
         if (known := self.drones.get(sensed.message.id)) is not None:

@@ -10,6 +10,8 @@ from shared.codec import MAX_PAYLOAD, decode, encode
 from shared.errors import DecodeError
 from shared.messages import (
     MAX_POSITION,
+    MAX_RADIUS,
+    MAX_VALID,
     MAX_VELOCITY,
     DroneState,
     Flag,
@@ -18,6 +20,7 @@ from shared.messages import (
     Heard,
     Message,
     Mode,
+    ObstacleState,
     PatternEvent,
     ProcessStatus,
     Seen,
@@ -69,6 +72,16 @@ MESSAGES: dict[type[Message], st.SearchStrategy[Any]] = {
         unheard=st.lists(st.integers(1, 65_535), max_size=4).map(tuple),
         lost=st.lists(LOST, max_size=3).map(tuple),
         step_ns=UINT64,
+    ),
+    ObstacleState: st.builds(
+        ObstacleState,
+        **ENVELOPE,
+        id=st.integers(1, 65_535),
+        position=POSITIONS,
+        velocity=VELOCITIES,
+        radius=st.floats(0.0, MAX_RADIUS),
+        height=st.floats(0.0, MAX_POSITION),
+        valid_s=st.floats(0.0, MAX_VALID),
     ),
     FormationState: st.builds(
         FormationState,

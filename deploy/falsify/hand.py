@@ -12,10 +12,10 @@ from deploy.falsify.case import Case, Fault, Stroke
 from deploy.lockstep.ticks import tick_ns
 from human_relay.relay import RelayState, make_sample, order
 from human_relay.sources.base import HandPose
-from human_relay.sources.scripted import MINIMUM_JERK_PEAK, minimum_jerk
 from shared.clock import NS_PER_S
 from shared.formation import Formation
 from shared.messages import HandSample, Vector, Wish
+from shared.stroke import MINIMUM_JERK_PEAK, minimum_jerk
 
 TURN_RATE = 2.0
 """How fast a hand turns at most on the average, rad/s."""

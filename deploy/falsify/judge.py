@@ -13,6 +13,7 @@ from agents.vehicles.bodies.state import AIRBORNE_HEIGHT
 from agents.vehicles.world.referee import Rules
 from deploy.falsify.swarm import Flown, Mask
 from shared.arrays import Vec
+from shared.cylinders import Cylinder
 
 Kind = Literal["drones", "hand", "column", "fence_x", "fence_y", "fence_z", "floor"]
 
@@ -115,8 +116,15 @@ def _column_gaps(position: Vec, rules: Rules) -> Vec:
     """(T, N) distances from the nearest column's surface, m."""
     gaps = np.full(position.shape[:2], np.inf)
     for column in rules.columns:
-        np.minimum(gaps, np.linalg.norm(position[..., :2] - column, axis=2) - rules.column_radius, out=gaps)
+        np.minimum(gaps, _surface_gaps(position, column), out=gaps)
     return gaps
+
+
+def _surface_gaps(position: Vec, cylinder: Cylinder) -> Vec:
+    """Does what `Cylinder.gap` does, (T, N), m."""
+    aside = np.hypot(position[..., 0] - cylinder.x, position[..., 1] - cylinder.y) - cylinder.radius
+    beyond = np.maximum(cylinder.low - position[..., 2], position[..., 2] - cylinder.high)
+    return np.where(beyond <= 0.0, aside, np.hypot(np.maximum(aside, 0.0), np.maximum(beyond, 0.0)))
 
 
 def _lowest(values: Vec, counts: Mask, t: Vec, ids: tuple[int, ...]) -> Worst:

@@ -7,6 +7,7 @@ import numpy as np
 
 from deploy.lockstep.record import Record
 from observer.colours import COLOURS, HAND, drone_colour
+from shared.cylinders import columns_of
 from shared.errors import ConfigError
 from shared.fence import fence_box
 from shared.scenario import Scenario
@@ -53,9 +54,8 @@ def _draw_room(axes: "Axes", record: Record, scenario: Scenario) -> None:
     axes.add_patch(
         Rectangle((low[1], low[0]), high[1] - low[1], high[0] - low[0], fill=False, ls=":", ec="0.5")
     )
-    radius = scenario.avoidance.columns.radius
-    for column in scenario.obstacles:
-        axes.add_patch(Circle((column.y, column.x), radius, fc="0.8", ec="0.5"))
+    for column in columns_of(scenario):
+        axes.add_patch(Circle((column.y, column.x), column.radius, fc="0.8", ec="0.5"))
 
 
 def _draw_paths(axes: "Axes", record: Record) -> None:

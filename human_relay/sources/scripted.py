@@ -22,6 +22,7 @@ from human_relay.sources.playback import Playback
 from shared.clock import NS_PER_S
 from shared.errors import ConfigError
 from shared.messages import Vector, Wish
+from shared.stroke import MINIMUM_JERK_PEAK, minimum_jerk
 from shared.uri import Uri
 
 REST: Vector = (0.0, 0.0, 1.2)
@@ -31,9 +32,6 @@ SIDE = 0.6
 """Length of each stroke of the tour, m."""
 EIGHT = (0.15, 0.3)
 """Half extent of the figure eight along x and y, m."""
-MINIMUM_JERK_PEAK = 1.875
-"""Peak over mean speed of the minimum-jerk profile."""
-
 Point = tuple[float, float]
 
 
@@ -66,11 +64,6 @@ class ScriptedHand(Playback):
         """A script moves in the world frame as it is: it says nothing about the mapping."""
         _segments(uri)
         return {}
-
-
-def minimum_jerk(fraction: float) -> float:
-    """Returns the travelled fraction of a minimum-jerk stroke at a fraction in [0, 1] of its time."""
-    return fraction**3 * (10.0 - 15.0 * fraction + 6.0 * fraction**2)
 
 
 def _segments(uri: Uri) -> list[Segment]:

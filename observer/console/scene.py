@@ -7,6 +7,7 @@ import numpy as np
 
 from observer.console.protocol import PROTOCOL_VERSION, Json
 from shared.arrays import Vec
+from shared.cylinders import columns_of
 from shared.fence import fence_box, goal_box, hand_box
 from shared.formation import Formation
 from shared.messages import Vector
@@ -55,7 +56,8 @@ class HandMap:
 def scene(scenario: Scenario, formation: Formation, hand: HandMap) -> Json:
     """Returns the `scene` message, without the number of the page."""
     low, high = fence_box(scenario, formation)
-    columns = scenario.avoidance.columns
+    reach = scenario.avoidance.columns.d0
+    columns = zip(scenario.obstacles, columns_of(scenario), strict=True)
     return {
         "type": "scene",
         "version": PROTOCOL_VERSION,
@@ -73,8 +75,15 @@ def scene(scenario: Scenario, formation: Formation, hand: HandMap) -> Json:
         "takeoff_height": scenario.limits.takeoff_height,
         "fence": {"min": low, "max": high},
         "obstacles": [
-            {"name": o.name, "x": o.x, "y": o.y, "radius": columns.radius, "range": columns.radius + columns.d0}
-            for o in scenario.obstacles
+            {
+                "name": column.name,
+                "x": column.x,
+                "y": column.y,
+                "radius": cylinder.radius,
+                "range": cylinder.radius + reach,
+                "height": min(cylinder.high, high[2]),
+            }
+            for column, cylinder in columns
         ],
         "drones": [_drone(formation, drone) for drone in formation.ids],
         "links": [

@@ -20,14 +20,16 @@ from shared.messages import (
     FormationState,
     HandSample,
     Mode,
+    ObstacleState,
     PatternEvent,
     ProcessStatus,
     Vector,
 )
 from shared.nodes import WORLD
+from shared.obstacle_watch import ObstacleWatch
 from shared.plain_text import plain
 from shared.senses import Sensed, Senses
-from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, STATUS
+from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, OBSTACLE, PATTERN, STATUS
 from shared.transport import MOST_KEYS, TOO_MANY, Arrival
 
 Frames = Mapping[str, Sequence[Json]]
@@ -62,13 +64,20 @@ class SwarmView:
         self._sensed = frozenset(self._senses.keys)
         self._hand, self._patterns, self._cues, self._start_ns = hand, patterns, cues, start_ns
         self._formation: Sensed[FormationState] | None = None
+        self._obstacles = ObstacleWatch()
         self._statuses: dict[str, Sensed[ProcessStatus]] = {}
         self._playing: Sensed[PatternEvent] | None = None
 
     @property
     def keys(self) -> list[str]:
         """Key expressions to subscribe to."""
-        return [*self._senses.keys, FORMATION_STATE.wildcard, PATTERN.wildcard, STATUS.wildcard]
+        return [
+            *self._senses.keys,
+            OBSTACLE.wildcard,
+            FORMATION_STATE.wildcard,
+            PATTERN.wildcard,
+            STATUS.wildcard,
+        ]
 
     @property
     def airborne(self) -> bool:
@@ -91,6 +100,8 @@ class SwarmView:
             for payload, arrival_ns in samples:
                 try:
                     message = decode_on(key, payload)
+                    if isinstance(message, ObstacleState):
+                        self._obstacles.hear(message.id, message, arrival_ns)
                 except DecodeError as error:
                     self.rejected[error.reason] += 1
                     continue
@@ -120,6 +131,7 @@ class SwarmView:
             "t": self._seconds(now_ns),
             "hand": None if hand is None or self.hand_position is None else self._hand_of(hand, now_ns),
             "drones": [_drone(sensed, now_ns) for _, sensed in sorted(self._senses.drones.items())],
+            "obstacles": [_obstacle(state, age) for state, age in self._obstacles.present(now_ns)],
             "formation": None if formation is None or _is_old(formation, now_ns) else _shape(formation.message),
         }
 
@@ -217,6 +229,17 @@ def _drone(sensed: Sensed[DroneState], now_ns: int) -> Json:
         "battery": state.battery,
         "age": sensed.age(now_ns),
         "links": {plain(name): displacement for name, displacement in state.displacements.items()},
+    }
+
+
+def _obstacle(state: ObstacleState, age: float) -> Json:
+    return {
+        "id": state.id,
+        "position": state.position,
+        "velocity": state.velocity,
+        "radius": state.radius,
+        "height": state.height,
+        "age": age,
     }
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from attrs import frozen
+from attrs import field, frozen
 
 from shared.clock import NS_PER_S
 from shared.formation import Formation
@@ -47,7 +47,8 @@ class FlightRecord:
         displacement: Link -> (T, 3) impedance displacement in the formation frame, m; empty without impedance.
         default_area: Area of the undisturbed formation, m^2.
         obstacles: Columns.
-        safety_radius: Of the zone around a column's centre in which avoidance acts, m.
+        zones: Of each, the radius of the zone around its centre in which avoidance acts, m.
+        walkers: Number -> (T, 3) way of what moved among the drones, m.
         patterns: What the operator felt.
         remarks: What was left out, and why, in words.
         mapping_known: Whether it is known how the hand was mapped; if not, `mapped` is the hand itself.
@@ -67,7 +68,8 @@ class FlightRecord:
     displacement: Mapping[str, Vec]
     default_area: float
     obstacles: tuple[Obstacle, ...]
-    safety_radius: float
+    zones: tuple[float, ...]
+    walkers: Mapping[int, Vec] = field(factory=dict)
     patterns: tuple[Played, ...] = ()
     remarks: tuple[str, ...] = ()
     mapping_known: bool = True

@@ -176,7 +176,7 @@ def _record(flight: _Recording) -> FlightRecord:
         displacement={},
         default_area=flight.side**2 * math.sqrt(3.0) / 4.0,
         obstacles=flight.obstacles,
-        safety_radius=flight.safety_radius,
+        zones=(flight.safety_radius,) * len(flight.obstacles),
         patterns=_played(flight.patterns, int(arrivals[0])),
         remarks=_remarks(flight),
         mapping_known=flight.mapping is not None,

@@ -4,6 +4,7 @@ A record covers the time in which every drone was in FOLLOW or HOLD, from the fi
 Values between two messages are interpolated, but not across a gap in which somebody was silent.
 """
 
+import contextlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import Generic, NamedTuple, TypeVar
 
@@ -12,20 +13,31 @@ import numpy as np
 from observer.report.record import ROW_HZ, FlightRecord, Played, mapped_hand, resample
 from observer.trace.read import Record, Trace
 from shared.clock import NS_PER_S
+from shared.cylinders import columns_of
 from shared.errors import ConfigError
 from shared.formation import Formation, build_formation
 from shared.geometry import hull_area
-from shared.messages import MAX_POSITION, NO_HAND, DroneState, HandSample, Message, Mode, PatternEvent
+from shared.messages import (
+    MAX_POSITION,
+    NO_HAND,
+    DroneState,
+    HandSample,
+    Message,
+    Mode,
+    ObstacleState,
+    PatternEvent,
+)
+from shared.obstacle_watch import MOST_OBSTACLES
 from shared.plain_text import plain
 from shared.recordings.check import check
 from shared.recordings.track import Found, Vec
-from shared.scenario import Avoidance
+from shared.scenario import Scenario
 
 FORMED = (Mode.FOLLOW, Mode.HOLD)
 _LATEST_NS = 2**63 - 1
 _LONGEST_NAME = 40
 
-M = TypeVar("M", HandSample, DroneState)
+M = TypeVar("M", HandSample, DroneState, ObstacleState)
 
 
 class _Said(Generic[M]):
@@ -77,6 +89,7 @@ class _Heard(NamedTuple):
     hand: _Said[HandSample]
     drones: dict[int, _Said[DroneState]]
     events: list[PatternEvent]
+    walkers: dict[int, _Said[ObstacleState]]
 
 
 def read_trace(trace: Trace, name: str) -> FlightRecord:
@@ -117,7 +130,8 @@ def read_trace(trace: Trace, name: str) -> FlightRecord:
         displacement=_displacements(formation, drones, t, start_ns),
         default_area=hull_area((x, y) for x, y, _ in formation.rest),
         obstacles=scenario.obstacles,
-        safety_radius=_safety_radius(scenario.avoidance),
+        zones=_zones(scenario),
+        walkers=_ways(heard, name, t, start_ns),
         patterns=_played(heard.events, start_ns, end_ns),
         remarks=(
             *trace.faults,
@@ -132,6 +146,7 @@ def _sort(formation: Formation, messages: Iterable[tuple[Record, Message]]) -> _
         _Said(lambda sample: sample.stamp_ns),
         {drone: _Said(lambda state: state.step_ns) for drone in formation.ids},
         [],
+        {},
     )
     for record, message in messages:
         if isinstance(message, HandSample) and message.position != NO_HAND:
@@ -140,7 +155,23 @@ def _sort(formation: Formation, messages: Iterable[tuple[Record, Message]]) -> _
             heard.drones[message.id].add(record, message)
         elif isinstance(message, PatternEvent):
             heard.events.append(message)
+        elif isinstance(message, ObstacleState) and len(heard.walkers) < MOST_OBSTACLES:
+            heard.walkers.setdefault(message.id, _Said(_stamp)).add(record, message)
     return heard
+
+
+def _stamp(state: ObstacleState) -> int:
+    return state.stamp_ns
+
+
+def _ways(heard: _Heard, name: str, t: Vec, start_ns: int) -> dict[int, Vec]:
+    """Returns the ways of what moved among the drones; of what was hardly heard there is none."""
+    found = {}
+    for number, said in sorted(heard.walkers.items()):
+        with contextlib.suppress(ConfigError):
+            known = said.checked(f"{name}, obstacle {number}")
+            found[number] = known.at(t, start_ns, lambda state: state.position)
+    return found
 
 
 def _check_flown(heard: _Heard, name: str) -> None:
@@ -189,10 +220,11 @@ def _displacements(
     return found
 
 
-def _safety_radius(avoidance: Avoidance) -> float:
+def _zones(scenario: Scenario) -> tuple[float, ...]:
+    avoidance = scenario.avoidance
     if avoidance.rule == "projection":
-        return avoidance.projection_radius + avoidance.projection_margin
-    return avoidance.columns.radius + avoidance.columns.d0
+        return (avoidance.projection_radius + avoidance.projection_margin,) * len(scenario.obstacles)
+    return tuple(column.radius + avoidance.columns.d0 for column in columns_of(scenario))
 
 
 def _played(events: Sequence[PatternEvent], start_ns: int, end_ns: int) -> tuple[Played, ...]:

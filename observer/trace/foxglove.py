@@ -28,8 +28,8 @@ def export_foxglove(trace: Trace, path: Path) -> int:
     """Writes an MCAP file with messages in JSON.
 
     Every valid message is on its own key, with its two times and its sequence number; in addition there are
-    `/scene` (`foxglove.SceneUpdate`: fence, columns, hand, drones, goals, links) and, of hand and drones,
-    `<key>/pose` (`foxglove.PoseInFrame`).
+    `/scene` (`foxglove.SceneUpdate`: fence, columns, hand, drones, goals, links, moving obstacles) and, of hand
+    and drones, `<key>/pose` (`foxglove.PoseInFrame`).
 
     Args:
         trace: What to write.

@@ -16,9 +16,11 @@ from observer.trace.foxglove_types import (
     Time,
     Vector3,
 )
+from shared.cylinders import Cylinder, columns_of, cylinder_of
 from shared.fence import fence_box
 from shared.formation import Formation
-from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Message, Vector
+from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Message, ObstacleState, Vector
+from shared.obstacle_watch import MOST_OBSTACLES
 from shared.scenario import Scenario
 
 FRAME = "world"
@@ -31,6 +33,7 @@ _RELAXED = Color(0.60, 0.60, 0.60)
 _STRETCHED = Color(0.84, 0.37, 0.00)
 _COLUMN = Color(0.35, 0.35, 0.35)
 _ZONE = Color(0.80, 0.47, 0.65, 0.25)
+_WALKER = Color(0.94, 0.89, 0.26, 0.7)
 _FENCE = Color(0.00, 0.62, 0.45)
 _LABEL = Color(0.80, 0.80, 0.80)
 
@@ -54,13 +57,19 @@ class Scene:
         self._hand: HandSample | None = None
         self._drones: dict[int, DroneState] = {}
         self._own = set(formation.ids)
+        self._walkers: dict[int, ObstacleState] = {}
 
     def add(self, message: Message) -> None:
-        """Takes a message; only the newest of the hand and of each drone counts."""
+        """Takes a message; only the newest of the hand, of each drone and of each moving obstacle counts."""
         if isinstance(message, HandSample):
             self._hand = message
         elif isinstance(message, DroneState) and self._has_room(message.id):
             self._drones[message.id] = message
+        elif isinstance(message, ObstacleState) and (message.id in self._walkers or self._has_room_aside()):
+            self._walkers[message.id] = message
+
+    def _has_room_aside(self) -> bool:
+        return len(self._walkers) < MOST_OBSTACLES
 
     def _has_room(self, drone: int) -> bool:
         """Says whether a drone is shown: those of the formation, and a few that anybody may have made up."""
@@ -70,16 +79,16 @@ class Scene:
     def surroundings(self, stamp_ns: int) -> SceneUpdate:
         """Returns what never moves: fence, columns and the zones in which they act."""
         avoidance = self._scenario.avoidance
-        if avoidance.rule == "field":
-            column, zone = avoidance.columns.radius, avoidance.columns.radius + avoidance.columns.d0
-        else:
-            column = avoidance.projection_radius
-            zone = column + avoidance.projection_margin
-        cylinders = [
-            self._cylinder(obstacle.x, obstacle.y, radius, color)
-            for obstacle in self._scenario.obstacles
-            for radius, color in ((column, _COLUMN), (zone, _ZONE))
-        ]
+        cylinders = []
+        for column in columns_of(self._scenario):
+            body, zone = column.radius, column.radius + avoidance.columns.d0
+            if avoidance.rule == "projection":
+                body = avoidance.projection_radius
+                zone = body + avoidance.projection_margin
+            standing = column._replace(low=0.0, high=min(column.high, self._box[1][2]))
+            cylinders += [
+                _upright(standing._replace(radius=r), color) for r, color in ((body, _COLUMN), (zone, _ZONE))
+            ]
         fence = LinePrimitive(self._edges(), _FENCE, thickness=1.0)
         return SceneUpdate(
             (
@@ -89,8 +98,12 @@ class Scene:
         )
 
     def moment(self, stamp_ns: int) -> SceneUpdate:
-        """Returns the hand, and every drone with its goal and its links."""
+        """Returns the hand, every drone with its goal and its links, and what moves among them."""
         entities = [self._drone(state, stamp_ns) for state in self._drones.values()]
+        entities += [
+            _entity(f"obstacle/{state.id}", stamp_ns, cylinders=(_upright(cylinder_of(state), _WALKER),))
+            for state in self._walkers.values()
+        ]
         if self._hand is not None and self._hand.position != NO_HAND:
             hand = _sphere(self._hand.position, _HAND_SIZE, _HAND)
             entities.append(_entity("hand", stamp_ns, spheres=(hand,)))
@@ -143,9 +156,12 @@ class Scene:
             for end in (one, other)
         )
 
-    def _cylinder(self, x: float, y: float, radius: float, color: Color) -> CylinderPrimitive:
-        top = self._box[1][2]
-        return CylinderPrimitive(Pose.at((x, y, top / 2)), Vector3(2 * radius, 2 * radius, top), color)
+
+def _upright(cylinder: Cylinder, color: Color) -> CylinderPrimitive:
+    x, y, radius, low, high = cylinder
+    return CylinderPrimitive(
+        Pose.at((x, y, (low + high) / 2)), Vector3(2 * radius, 2 * radius, high - low), color
+    )
 
 
 def _entity(

@@ -9,15 +9,26 @@ from observer.trace.read import Trace
 from shared.clock import NS_PER_S
 from shared.formation import build_formation
 from shared.messages import Heard, Message, Seen
+from shared.obstacle_watch import MOST_OBSTACLES
 from shared.scenario import Scenario
 from shared.spreadsheet import cell
-from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, PATTERN, TOPICS, parse_key, rank, topic_of
+from shared.topics import (
+    DRONE_STATE,
+    FORMATION_STATE,
+    HAND,
+    OBSTACLE,
+    PATTERN,
+    TOPICS,
+    parse_key,
+    rank,
+    topic_of,
+)
 
 ALIGNED = "aligned.csv"
 """Name of the table with everything side by side."""
 
 _PERIOD_NS = round(NS_PER_S / HAND.rate_hz)
-_SIDE_BY_SIDE = (HAND, DRONE_STATE, FORMATION_STATE, PATTERN)
+_SIDE_BY_SIDE = (HAND, DRONE_STATE, OBSTACLE, FORMATION_STATE, PATTERN)
 _LONGEST_CURRENT_S = max(topic.stale_s for topic in TOPICS if topic in _SIDE_BY_SIDE)
 """After this long without a message nothing is current."""
 _TECHNICAL = (
@@ -50,9 +61,9 @@ def export_csv(trace: Trace, folder: Path) -> Exported:
 
     `<key with dashes>.csv` has one row per valid message, with the names of its fields; vectors become `_x`,
     `_y`, `_z`, maps `field.key`. `aligned.csv` has 60 rows per second of the recorder's clock: `time_s`
-    since the first message, and what was then the newest of hand, drones, formation and glove, left empty where
-    it is older than its topic allows; there are no rows for times in which all of it is. A pattern event stands
-    in the one row in which it came.
+    since the first message, and what was then the newest of hand, drones, obstacles, formation and glove, left
+    empty where it is older than its topic allows; there are no rows for times in which all of it is. A pattern
+    event stands in the one row in which it came.
 
     Args:
         trace: What to write; it is read twice, and never held in memory.
@@ -198,7 +209,11 @@ def most_columns(scenario: Scenario) -> int:
 
 def _is_side_by_side(key: str, drones: set[int]) -> bool:
     place = parse_key(key)
-    return place.topic in _SIDE_BY_SIDE and (place.topic is not DRONE_STATE or place.id in drones)
+    if place.topic is DRONE_STATE:
+        return place.id in drones
+    if place.topic is OBSTACLE:
+        return place.id <= MOST_OBSTACLES
+    return place.topic in _SIDE_BY_SIDE
 
 
 def _chosen(key: str, columns: dict[str, None]) -> dict[str, str]:

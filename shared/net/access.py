@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from shared.nodes import BRIDGE, CONSOLE, OBSERVER, RELAY, WORLD
-from shared.topics import ALIVE, DRONE_STATE, FORMATION_STATE, HAND, PATTERN, STATUS, TOPICS
+from shared.topics import ALIVE, DRONE_STATE, FORMATION_STATE, HAND, OBSTACLE, PATTERN, STATUS, TOPICS
 
 Rules = dict[str, Any]
 
@@ -23,7 +23,7 @@ def writes(node: str) -> tuple[str, ...]:
     said = {
         RELAY: (HAND.key(),),
         BRIDGE: (FORMATION_STATE.key(), PATTERN.key()),
-        WORLD: (),
+        WORLD: (OBSTACLE.wildcard,),
         OBSERVER: (),
     }
     states = said[node] if node in said else (DRONE_STATE.key(id=node.partition("/")[2]),)

@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 
+from shared.cylinders import columns_of
 from shared.fence import fence_box, goal_box, hand_box, shape_box
 from shared.formation import Formation
 from shared.scenario import Pair, Scenario
@@ -16,6 +17,9 @@ BODY = 0.06
 START_ROOM = 0.05
 """Between a column's surface and a body that takes off beside it, m: it drifts a little while it climbs."""
 
+FASTEST_WALKER = 1.5
+"""Drones evade a hand, or a person, of at most this speed, m/s."""
+
 _ROUNDING = 1e-9
 _AXES = "xyz"
 
@@ -27,6 +31,7 @@ def check_room(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
     yield from _heights_fit(scenario, formation)
     yield from _clip_fits(scenario, formation)
     yield from _columns_fit(scenario, formation)
+    yield from _walkers_fit(scenario, formation)
 
 
 def _formation_fits(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
@@ -111,8 +116,8 @@ def _columns_fit(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
         if times > 1:
             yield Finding("obstacles", f"the name {name!r} appears {times} times", "give each its own")
     starts = _starts(scenario, formation)
-    needed = scenario.avoidance.columns.radius + BODY + START_ROOM
-    for column in scenario.obstacles:
+    for column, cylinder in zip(scenario.obstacles, columns_of(scenario), strict=True):
+        needed = cylinder.radius + BODY + START_ROOM
         gaps = [math.dist(start, (column.x, column.y)) for start in starts]
         nearest = min(gaps)
         if nearest < needed:
@@ -129,3 +134,24 @@ def _starts(scenario: Scenario, formation: Formation) -> list[Pair]:
     """Returns where the drones begin, m."""
     home_x, home_y = scenario.hand.home
     return [(home_x + x, home_y + y) for x, y, _ in formation.rest]
+
+
+def _walkers_fit(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
+    (home_x, home_y), keep = scenario.hand.home, BODY + START_ROOM
+    starts = [(home_x + x, home_y + y) for x, y, _ in formation.rest]
+    for walker in scenario.walkers:
+        if walker.speed > FASTEST_WALKER:
+            yield Finding(
+                "walkers",
+                f"{walker.name!r} walks at {walker.speed:g} m/s, drones evade at most {FASTEST_WALKER:g} m/s",
+                "slow down",
+            )
+        gaps = [math.dist(walker.path[0], start) for start in starts]
+        nearest = gaps.index(min(gaps))
+        if gaps[nearest] < walker.radius + keep:
+            yield Finding(
+                "walkers",
+                f"{walker.name!r} stands {gaps[nearest]:.2f} m from where drone {formation.ids[nearest]}"
+                f" begins, less than {walker.radius + keep:.2f} m",
+                "let the path begin elsewhere, or move hand.home",
+            )

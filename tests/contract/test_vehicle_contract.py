@@ -41,7 +41,6 @@ class SimStage:
         self._rules = Rules(
             ids=(DRONE,),
             columns=(),
-            column_radius=0.12,
             fence=((-9.0, -9.0, -9.0), (9.0, 9.0, 9.0)),
         )
         self.radio = Radio(("127.0.0.1", 0), (DRONE,), frozenset())

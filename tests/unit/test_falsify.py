@@ -77,7 +77,7 @@ def test_every_class_can_be_broken() -> None:
             [(high_x + 0.03, 0.0, 1.0), (0.0, 0.0, 1.0)],
             [(0.0, high_y + 0.04, 1.0), (0.0, 0.0, 1.0)],
             [(0.0, 0.0, high_z + 0.05), (0.0, 0.0, 0.0)],
-            [(*column, 1.0), (0.0, 0.0, 1.0)],
+            [(column.x, column.y, 1.0), (0.0, 0.0, 1.0)],
         ]
     )
     yes = np.ones(places.shape[:2], dtype=bool)

@@ -70,7 +70,8 @@ def test_only_the_relay_writes_the_hand_and_each_drone_its_own_state() -> None:
 def test_every_topic_has_somebody_who_may_write_it() -> None:
     written = {key for node in NODES for key in writes(node)}
     for topic in TOPICS:
-        assert written & {topic.key(id=1, role="drone"), topic.key(id=0, role="relay")}, topic.pattern
+        keys = {topic.key(id=1, role="drone"), topic.key(id=0, role="relay"), topic.wildcard}
+        assert written & keys, topic.pattern
 
 
 def test_a_certificate_that_nobody_would_trust_is_refused_with_what_to_do(

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.vehicles.world.referee import RefereeState, Rules, report, update
+from shared.cylinders import Cylinder
 from shared.messages import ORIGIN, Vector
 
 IDS = (1, 2, 4, 7)
@@ -22,8 +23,7 @@ instants = st.lists(st.tuples(places, st.tuples(*[st.booleans()] * 4)), min_size
 def make_rules(*columns: tuple[float, float]) -> Rules:
     return Rules(
         ids=IDS,
-        columns=columns,
-        column_radius=0.12,
+        columns=tuple(Cylinder(x, y, 0.12) for x, y in columns),
         fence=((-3.0, -3.0, -0.1), (3.0, 3.0, 3.0)),
     )
 
@@ -92,7 +92,12 @@ def test_fence_exit_counts_once_per_episode_and_only_in_the_air() -> None:
 def test_grounded_drones_do_not_count() -> None:
     rules, close = make_rules(), [ORIGIN] * 4
     state = update(rules, RefereeState(), close, DOWN, hand=ORIGIN, t=0.0)
-    assert report(state) == {"collisions": 0, "column_contacts": 0, "fence_exits": 0}
+    assert report(state) == {
+        "collisions": 0,
+        "column_contacts": 0,
+        "obstacle_contacts": 0,
+        "fence_exits": 0,
+    }
 
 
 def test_landing_ends_an_episode() -> None:

@@ -56,7 +56,7 @@ def straight_flight() -> FlightRecord:
         displacement={link.name: np.zeros((len(T), 3)) for link in FORMATION.links},
         default_area=0.5,
         obstacles=(Obstacle(name="a", x=-1.0, y=1.0),),
-        safety_radius=0.42,
+        zones=(0.42,),
         patterns=(Played(1.0, "CR", 0.3), Played(2.0, "EI", 0.7)),
     )
 

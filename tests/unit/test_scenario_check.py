@@ -77,6 +77,8 @@ def test_the_recorded_flights_pass(flight: Path) -> None:
         ("maze", "hand.clip={min=[-2.5,-1.0],max=[1.0,1.0]}", "hand.clip"),
         ("rhombus", 'obstacles=[{name="a",x=-0.5,y=0.1}]', "obstacles"),
         ("rhombus", 'obstacles=[{name="a",x=3,y=0},{name="a",x=2,y=0}]', "obstacles"),
+        ("rhombus", 'walkers=[{name="a", path=[[-0.5, 0.2]]}]', "walkers"),
+        ("rhombus", 'walkers=[{name="a", path=[[2.0, 2.0], [2.0, 0.0]], speed=1.6}]', "walkers"),
         ("rhombus", "formation.n=5", "formation.n"),
         ("rhombus", "formation.columns=2", "formation.columns"),
         ("line", "formation.width=0.7", "formation.width"),

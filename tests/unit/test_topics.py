@@ -14,6 +14,7 @@ from shared.topics import (
     DRONE_STATE,
     FORMATION_STATE,
     HAND,
+    OBSTACLE,
     PATTERN,
     STATUS,
     TOPICS,
@@ -51,6 +52,7 @@ def test_wildcards_have_one_star_per_varying_chunk() -> None:
     assert {topic.wildcard for topic in TOPICS} == {
         "human/hand",
         "drone/*/state",
+        "obstacle/*",
         "formation/state",
         "glove/pattern",
         "status/*/*",
@@ -111,7 +113,7 @@ def test_presence_does_not_mix_with_messages() -> None:
 def test_what_drives_control_is_state_and_what_informs_is_reliable() -> None:
     by_delivery = {delivery: {t for t in TOPICS if t.delivery is delivery} for delivery in Delivery}
     assert by_delivery == {
-        Delivery.STATE: {HAND, DRONE_STATE, FORMATION_STATE},
+        Delivery.STATE: {HAND, DRONE_STATE, OBSTACLE, FORMATION_STATE},
         Delivery.EVENT: {PATTERN, STATUS},
     }
 

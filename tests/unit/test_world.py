@@ -22,6 +22,7 @@ from agents.vehicles.world.world import MAX_CATCH_UP, TICK, World
 from shared.arrays import rest_of
 from shared.codec import encode
 from shared.config import structure_scenario
+from shared.cylinders import Cylinder
 from shared.errors import ConfigError, DeviceError
 from shared.memory_bus import MemoryBus, MemoryNetwork
 from shared.messages import HandSample, Wish
@@ -47,7 +48,7 @@ def driver(radio: Radio) -> Iterator[socket.socket]:
 
 def make_world(radio: Radio, failing: Mapping[int, VehicleSettings] = MappingProxyType({})) -> World:
     fleet = park_fleet({1: "identified", 2: "crazyflie"}, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
-    rules = Rules(ids=IDS, columns=(), column_radius=0.1, fence=((-9.0, -9.0, -9.0), (9.0, 9.0, 9.0)))
+    rules = Rules(ids=IDS, columns=(), fence=((-9.0, -9.0, -9.0), (9.0, 9.0, 9.0)))
     return World(fleet, radio, rules, 10.0, {drone: faults_of(each) for drone, each in failing.items()})
 
 
@@ -133,7 +134,7 @@ def test_plan_parks_the_formation_at_home() -> None:
     assert list(setup.fleet) == [1, 2, 3, 4]
     assert setup.address == ("127.0.0.1", 7400)
     assert setup.hovers == {1, 2, 3, 4}
-    assert setup.rules.columns == ((5.0, 6.0),)
+    assert setup.rules.columns == (Cylinder(5.0, 6.0, 0.12),)
     expected = rest_of(setup.formation)[:, :2] + np.array([1.0, 2.0])
     places = [flyer.body.position for flyer in setup.fleet.values()]
     assert places == [(x, y, 0.0) for x, y in expected.tolist()]

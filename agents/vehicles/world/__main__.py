@@ -5,6 +5,7 @@ import sys
 import time
 from pathlib import Path
 
+from agents.vehicles.world.crowd import Crowd
 from agents.vehicles.world.hand import HandWatch
 from agents.vehicles.world.radio import Radio
 from agents.vehicles.world.record import RefereeFile
@@ -41,9 +42,10 @@ def main() -> int:
     clock = system_clock()
     with radio, bus, RefereeFile(arguments.run_dir) as report:
         hand, status = HandWatch(bus, clock, verify), StatusReporter(bus, WORLD, 0, clock, tell_form())
+        crowd = Crowd(bus, scenario.walkers, clock)
         world = World(setup.fleet, radio, setup.rules, time.monotonic(), setup.faults)
         while not stopping.wait(max(0.0, world.next_tick - time.monotonic())):
-            world.run_until(time.monotonic(), hand.position())
+            world.run_until(time.monotonic(), hand.position(), crowd.step())
             report.write_when_due(time.monotonic(), world.metrics)
             status.tick(world.ticks, "running", radio.rejected + hand.rejected, world.metrics)
         status.tick(world.ticks, "ending", radio.rejected + hand.rejected, world.metrics, force=True)

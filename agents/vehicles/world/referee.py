@@ -11,8 +11,8 @@ from typing import NamedTuple, TypeVar
 from attrs import evolve, frozen
 
 from shared.cells import near_pairs
+from shared.cylinders import Cylinder
 from shared.messages import Vector
-from shared.scenario import Pair
 
 K = TypeVar("K", bound=tuple[int, ...])
 
@@ -26,15 +26,13 @@ class Rules:
 
     Attributes:
         ids: Numbers of the drones.
-        columns: Axes of the vertical columns, m.
-        column_radius: Radius of a column, m.
+        columns: The columns.
         body_radius: Half the contact distance of two bodies, m: a Crazyflie's arm (0.046) and its propeller.
         fence: Lower and upper corner of the fence, m.
     """
 
     ids: tuple[int, ...]
-    columns: tuple[Pair, ...]
-    column_radius: float
+    columns: tuple[Cylinder, ...]
     body_radius: float = 0.06
     fence: tuple[Vector, Vector]
 
@@ -58,21 +56,27 @@ class RefereeState:
     Attributes:
         pair: Nearest two drones (3-D).
         hand: Nearest drone to the hand (3-D).
+        obstacle: Nearest drone to the surface of a moving obstacle.
         drone_contacts: Contacts between drones.
         column_contacts: Contacts with columns.
+        obstacle_contacts: Contacts with moving obstacles.
         fence_exits: Exits from the fence.
         touching: Pairs of drones in contact at the last update.
         grazing: Drones in contact with columns at the last update, and with which.
+        bumping: The same with moving obstacles.
         outside: Drones outside the fence at the last update.
     """
 
     pair: Closest = NEVER
     hand: Closest = NEVER
+    obstacle: Closest = NEVER
     drone_contacts: int = 0
     column_contacts: int = 0
+    obstacle_contacts: int = 0
     fence_exits: int = 0
     touching: frozenset[tuple[int, int]] = NOBODY
     grazing: frozenset[tuple[int, int]] = NOBODY
+    bumping: frozenset[tuple[int, int]] = NOBODY
     outside: frozenset[int] = frozenset()
 
 
@@ -84,6 +88,7 @@ def update(
     *,
     hand: Vector | None,
     t: float,
+    obstacles: Sequence[Cylinder] = (),
 ) -> RefereeState:
     """Looks at one instant.
 
@@ -94,24 +99,30 @@ def update(
         airborne: Which bodies are clear of the ground.
         hand: The hand in the world frame, m; None if unknown.
         t: Time, s.
+        obstacles: What moves among the drones, as it is now.
     """
     if not any(airborne):
-        return evolve(state, touching=NOBODY, grazing=NOBODY, outside=frozenset())
+        return evolve(state, touching=NOBODY, grazing=NOBODY, bumping=NOBODY, outside=frozenset())
     contact = 2.0 * rules.body_radius
     gaps = _gaps(rules, positions, airborne, max(contact, state.pair.distance))
     touching = frozenset(pair for pair, gap in gaps.items() if gap < contact)
     flying = [(rules.ids[k], positions[k]) for k in range(len(rules.ids)) if airborne[k]]
-    grazing = frozenset(_grazing(rules, flying))
+    grazing = frozenset(key for key, gap in _surface_gaps(flying, rules.columns) if gap < rules.body_radius)
+    to_obstacles = dict(_surface_gaps(flying, obstacles))
+    bumping = frozenset(key for key, gap in to_obstacles.items() if gap < rules.body_radius)
     outside = frozenset(drone for drone, position in flying if _is_outside(position, rules.fence))
     to_hand = {} if hand is None else {(drone,): math.dist(position, hand) for drone, position in flying}
     return RefereeState(
         pair=_nearest(state.pair, gaps, t),
         hand=_nearest(state.hand, to_hand, t),
+        obstacle=_nearest(state.obstacle, to_obstacles, t),
         drone_contacts=state.drone_contacts + len(touching - state.touching),
         column_contacts=state.column_contacts + len(grazing - state.grazing),
+        obstacle_contacts=state.obstacle_contacts + len(bumping - state.bumping),
         fence_exits=state.fence_exits + len(outside - state.outside),
         touching=touching,
         grazing=grazing,
+        bumping=bumping,
         outside=outside,
     )
 
@@ -119,11 +130,12 @@ def update(
 def report(state: RefereeState) -> dict[str, float]:
     """Returns the numbers by name; a distance that was never defined is left out.
 
-    `collisions` is the sum of the contacts with drones and with columns.
+    `collisions` is the sum of the contacts with drones, columns and moving obstacles.
     """
     numbers: dict[str, float] = {
-        "collisions": state.drone_contacts + state.column_contacts,
+        "collisions": state.drone_contacts + state.column_contacts + state.obstacle_contacts,
         "column_contacts": state.column_contacts,
+        "obstacle_contacts": state.obstacle_contacts,
         "fence_exits": state.fence_exits,
     }
     if state.pair.drones:
@@ -134,6 +146,10 @@ def report(state: RefereeState) -> dict[str, float]:
         numbers["min_hand_distance_m"] = state.hand.distance
         numbers["min_hand_distance_t_s"] = state.hand.t
         (numbers["min_hand_distance_to"],) = state.hand.drones
+    if state.obstacle.drones:
+        numbers["min_obstacle_distance_m"] = state.obstacle.distance
+        numbers["min_obstacle_distance_t_s"] = state.obstacle.t
+        numbers["min_obstacle_distance_to"], _ = state.obstacle.drones
     return numbers
 
 
@@ -164,12 +180,13 @@ def _first_gaps(
         reach *= 2.0
 
 
-def _grazing(rules: Rules, flying: Iterable[tuple[int, Vector]]) -> Iterable[tuple[int, int]]:
-    touch = rules.column_radius + rules.body_radius
-    for drone, (x, y, _) in flying:
-        for column, (cx, cy) in enumerate(rules.columns):
-            if math.hypot(x - cx, y - cy) < touch:
-                yield drone, column
+def _surface_gaps(
+    flying: Iterable[tuple[int, Vector]], cylinders: Sequence[Cylinder]
+) -> Iterable[tuple[tuple[int, int], float]]:
+    """Yields how far each drone is from the surface of each cylinder: `(drone, index)` and m."""
+    for drone, position in flying:
+        for index, cylinder in enumerate(cylinders):
+            yield (drone, index), cylinder.gap(position)
 
 
 def _is_outside(position: Vector, fence: tuple[Vector, Vector]) -> bool:

@@ -10,6 +10,7 @@ from agents.vehicles.sim import parse_uri
 from agents.vehicles.world.faults import Faults, faults_of
 from agents.vehicles.world.referee import Rules
 from shared.config import vehicle_settings
+from shared.cylinders import columns_of
 from shared.errors import ConfigError
 from shared.fence import fence_box
 from shared.formation import Formation, build_formation
@@ -65,8 +66,7 @@ def referee_rules(scenario: Scenario, formation: Formation, ids: tuple[int, ...]
     """Returns what the referee counts for some drones of a scenario."""
     return Rules(
         ids=ids,
-        columns=tuple((o.x, o.y) for o in scenario.obstacles),
-        column_radius=scenario.avoidance.columns.radius,
+        columns=columns_of(scenario),
         fence=fence_box(scenario, formation),
     )
 

@@ -1,11 +1,12 @@
 """The world's clock: takes commands, advances all bodies, tells their drivers and the referee."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from agents.vehicles.bodies.fleet import Fleet, advance, pose_of
 from agents.vehicles.world.faults import NO_FAULTS, Faults
 from agents.vehicles.world.radio import Radio
 from agents.vehicles.world.referee import RefereeState, Rules, report, update
+from shared.cylinders import Cylinder
 from shared.messages import Vector
 
 TICK = 0.01
@@ -51,12 +52,13 @@ class World:
         """Monotonic time at which `run_until` has work, s."""
         return self._next + TICK
 
-    def run_until(self, now: float, hand: Vector | None = None) -> None:
+    def run_until(self, now: float, hand: Vector | None = None, obstacles: Sequence[Cylinder] = ()) -> None:
         """Makes every tick that is due.
 
         Args:
             now: Monotonic time, s.
             hand: The hand in the world frame, m; None if unknown.
+            obstacles: What moves among the drones, as it is now.
         """
         self._radio.receive(now)
         behind = now - self._next - MAX_CATCH_UP * TICK
@@ -66,13 +68,13 @@ class World:
         # Half a nanosecond: a tick is due even if summing up its time was rounded up.
         while self.next_tick <= now + 5e-10:
             self._next = self.next_tick
-            self._tick(self._next, hand)
+            self._tick(self._next, hand, obstacles)
 
     def metrics(self) -> dict[str, float]:
         """Returns the referee's numbers and the world's own."""
         return {**report(self._referee), "lost_time_s": self.lost_time}
 
-    def _tick(self, now: float, hand: Vector | None) -> None:
+    def _tick(self, now: float, hand: Vector | None, obstacles: Sequence[Cylinder]) -> None:
         t, seq = now - self._start, self._first_seq + self.ticks
         reports = {}
         for drone, before in self.fleet.items():
@@ -86,5 +88,7 @@ class World:
         self._radio.send(reports)
         flyers = self.fleet.values()
         positions, airborne = [f.body.position for f in flyers], [f.airborne for f in flyers]
-        self._referee = update(self._rules, self._referee, positions, airborne, hand=hand, t=t)
+        self._referee = update(
+            self._rules, self._referee, positions, airborne, hand=hand, t=t, obstacles=obstacles
+        )
         self.ticks += 1

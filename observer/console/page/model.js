@@ -9,7 +9,7 @@
  * @property {boolean} can_steer
  * @property {{start: Vector, low: Vector, high: Vector, max_speed: number, fixed_height: boolean}} hand
  * @property {{min: Vector, max: Vector}} fence
- * @property {{name: string, x: number, y: number, radius: number, range: number}[]} obstacles
+ * @property {{name: string, x: number, y: number, radius: number, range: number, height: number}[]} obstacles
  * @property {{id: number, references: (string | number)[], rest: Vector}[]} drones
  * @property {{name: string, from: string | number, to: number, limit: number}[]} links
  */
@@ -27,10 +27,20 @@
  * @property {Record<string, Vector>} links
  */
 /**
+ * @typedef {object} Obstacle what moves among the drones
+ * @property {number} id
+ * @property {Vector} position
+ * @property {Vector} velocity
+ * @property {number} radius
+ * @property {number} height
+ * @property {number} age
+ */
+/**
  * @typedef {object} Snapshot
  * @property {number} t
  * @property {null | {point: Vector, real: Vector, velocity: Vector, yaw: number, wish: string, age: number}} hand
  * @property {Drone[]} drones
+ * @property {Obstacle[]} obstacles
  * @property {null | {area_ratio: number, extent: number, trend: number, missing: number[]}} formation
  */
 

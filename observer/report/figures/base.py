@@ -100,10 +100,16 @@ def draw_columns(axes: "Axes", record: FlightRecord) -> None:
         return
     for number, column in enumerate(record.obstacles):
         label = "safety zone" if number == 0 else None
-        zone = Circle((column.y, column.x), record.safety_radius, fc="0.93", ec="0.75", lw=0.6, label=label)
+        zone = Circle((column.y, column.x), record.zones[number], fc="0.93", ec="0.75", lw=0.6, label=label)
         axes.add_patch(zone)
     across, along = zip(*((column.y, column.x) for column in record.obstacles), strict=True)
     axes.plot(across, along, ls="", marker="s", ms=4, color="0.35", label="column")
+
+
+def draw_walkers(axes: "Axes", record: FlightRecord) -> None:
+    """Draws the ways of what moved among the drones, from above."""
+    for number, way in record.walkers.items():
+        axes.plot(way[:, 1], way[:, 0], color="0.35", lw=1.2, ls=":", label=f"obstacle {number}")
 
 
 def draw_paths(axes: "Axes", record: FlightRecord) -> None:

@@ -39,8 +39,8 @@ export function drawWall(pen, camera, scene, palette, view) {
   if (!view.bare) {
     pen.fillStyle = palette.obstacle;
     pen.globalAlpha = 0.22;
-    for (const { y, radius } of scene.obstacles) {
-      const [x, top] = camera.toScreen([0, y, scene.fence.max[2]]);
+    for (const { y, radius, height } of scene.obstacles) {
+      const [x, top] = camera.toScreen([0, y, height]);
       pen.fillRect(x - radius * camera.across, top, 2 * radius * camera.across, camera.floor - top);
     }
     pen.globalAlpha = 1;

@@ -31,6 +31,7 @@ export function drawSky(pen, camera, model, palette, choice) {
     if (choice.trails) {
       drawTrails(pen, camera, model, palette);
     }
+    drawWalkers(pen, camera, model, palette);
     drawLinks(pen, camera, model, palette);
     drawIntents(pen, camera, drones, palette);
     const radius = Math.min(17, Math.max(5, BODY_M * camera.scale));
@@ -52,6 +53,14 @@ export function drawSky(pen, camera, model, palette, choice) {
 export function drawHeights(pen, camera, model, palette, choice) {
   pen.lineWidth = 1;
   if (!choice.bare) {
+    for (const { position, radius, height } of model.snapshot?.obstacles ?? []) {
+      const [x, foot] = camera.toScreen(position);
+      const [, top] = camera.toScreen([position[0], position[1], position[2] + height]);
+      pen.fillStyle = palette.care;
+      pen.globalAlpha = 0.35;
+      pen.fillRect(x - radius * camera.across, top, 2 * radius * camera.across, foot - top);
+      pen.globalAlpha = 1;
+    }
     for (const drone of model.snapshot?.drones ?? []) {
       const [x, y] = camera.toScreen(drone.position);
       const [, goal] = camera.toScreen([drone.position[0], drone.position[1], drone.goal[2]]);
@@ -90,6 +99,22 @@ function drawTrails(pen, camera, model, palette) {
   }
   pen.stroke();
   pen.globalAlpha = 1;
+}
+
+/** Who walks among the drones is a disc, with a line to where it will be in half a second.
+ * @param {CanvasRenderingContext2D} pen @param {Camera} camera @param {Model} model @param {Palette} palette */
+function drawWalkers(pen, camera, model, palette) {
+  pen.strokeStyle = pen.fillStyle = palette.care;
+  pen.lineWidth = 1.5;
+  for (const { position, velocity, radius } of model.snapshot?.obstacles ?? []) {
+    const [x, y] = camera.toScreen(position);
+    pen.globalAlpha = 0.35;
+    disc(pen, x, y, radius * camera.scale);
+    pen.globalAlpha = 1;
+    ring(pen, x, y, radius * camera.scale);
+    const soon = [position[0] + 0.5 * velocity[0], position[1] + 0.5 * velocity[1], 0];
+    stroke(pen, x, y, ...camera.toScreen(soon));
+  }
 }
 
 /** A link is a line, the thicker the further its spring is displaced.
