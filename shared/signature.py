@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shared.errors import ConfigError, DecodeError
+from shared.files import read_bytes
 from shared.topics import HAND
 
 SIGNATURE_BYTES = 64
@@ -88,6 +89,6 @@ def _read_key(file: Path, load: Callable[[bytes], object]) -> object:
     from cryptography.exceptions import UnsupportedAlgorithm  # noqa: PLC0415
 
     try:
-        return load(file.read_bytes())
+        return load(read_bytes(file))
     except (OSError, ValueError, TypeError, UnsupportedAlgorithm) as error:  # TypeError: a password
         raise ConfigError(f"{file}: no readable key of the hand ({error})") from error

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from shared.errors import ConfigError
-from shared.text_file import read_text
+from shared.files import read_text
 
 
 def read_toml(path: Path, hint: str = "") -> dict[str, Any]:

@@ -8,7 +8,6 @@ does not: a percent sign is one. A file that is there under the literal name goe
 import math
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from urllib.parse import unquote
 
 from attrs import field, frozen
@@ -64,25 +63,6 @@ class Uri:
     def path(self) -> str:
         """What follows the scheme (and `//`), percent-decoded but for `%25`."""
         return unquote(self.literal.replace("%25", "%2525"))
-
-    def file(self, example: str) -> Path:
-        """Returns the file or folder that the path names, be it there or not.
-
-        Args:
-            example: A good URI, for the message.
-
-        Raises:
-            ConfigError: There is no path.
-        """
-        if not self.path or "\0" in self.path:
-            raise ConfigError(f"{self.text}: no path; for example {example}")
-        return file_path(self.literal)
-
-
-def file_path(text: str) -> Path:
-    """Returns the file of a name, or of the percent-decoded name if only that is there."""
-    path, decoded = (Path(name).expanduser() for name in (text, unquote(text)))
-    return decoded if not path.exists() and decoded.exists() else path
 
 
 def parse_uri(text: str, *, example: str) -> Uri:

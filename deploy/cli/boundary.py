@@ -73,7 +73,7 @@ def _keep(argv: Sequence[str], error: Exception) -> str:
     trace = "".join(traceback.format_exception(error))
     report = f"{shlex.join(argv)}\nPython {platform.python_version()}, {platform.platform()}\n\n{trace}"
     try:
-        handle, path = tempfile.mkstemp(prefix="swarmtouch-", suffix=".log", text=True)
+        handle, path = tempfile.mkstemp(prefix="swarmtouch-", suffix=".log")
         with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
             file.write(report)
     except OSError:

@@ -94,7 +94,13 @@ def _run(work: Path, recipe: Recipe) -> None:
     # Flags of the environment might let the two forms differ.
     environment = {key: value for key, value in os.environ.items() if key not in ("CFLAGS", "CPPFLAGS")}
     done = subprocess.run(
-        command, cwd=work / "sources", env=environment, check=False, capture_output=True, text=True
+        command,
+        cwd=work / "sources",
+        env=environment,
+        check=False,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
     )
     if done.returncode:
         lines = [*done.stdout.splitlines(), *done.stderr.splitlines()]

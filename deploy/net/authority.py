@@ -14,6 +14,7 @@ import tomli_w
 from attrs import frozen
 
 from shared.errors import ConfigError
+from shared.files import read_bytes
 from shared.net.anchors import issuer_of
 from shared.net.keyring import MEMBERS_FILE, Keyring, stem
 
@@ -205,7 +206,7 @@ def _hosts(certificate: x509.Certificate) -> tuple[str, ...]:
 def _authority(keyring: Keyring) -> tuple[x509.Certificate, ec.EllipticCurvePrivateKey]:
     hint = "issue certificates where swarmtouch net keys init was run"
     try:
-        key = serialization.load_pem_private_key(keyring.authority_key.read_bytes(), password=None)
+        key = serialization.load_pem_private_key(read_bytes(keyring.authority_key), password=None)
     except (OSError, ValueError, TypeError, UnsupportedAlgorithm) as error:
         raise ConfigError(f"{keyring.authority_key}: no key of an authority ({error}); {hint}") from error
     if not isinstance(key, ec.EllipticCurvePrivateKey):
@@ -215,7 +216,7 @@ def _authority(keyring: Keyring) -> tuple[x509.Certificate, ec.EllipticCurvePriv
 
 def _load(file: Path) -> x509.Certificate:
     try:
-        return x509.load_pem_x509_certificate(file.read_bytes())
+        return x509.load_pem_x509_certificate(read_bytes(file))
     except (OSError, ValueError, x509.InvalidVersion) as error:
         raise ConfigError(f"{file}: not a certificate ({error})") from error
 

@@ -17,7 +17,8 @@ from glove_bridge.patterns.pattern import Pattern
 from glove_bridge.session import Session
 from shared.clock import NS_PER_S
 from shared.errors import ConfigError
-from shared.uri import Uri, file_path
+from shared.files import named
+from shared.uri import Uri
 
 _RATES = (9600, 19200, 38400, 57600, 115200)
 _LINKS = {"usb": USB, "xbee": XBEE}
@@ -51,7 +52,7 @@ class SerialGlove:
         if not uri.path:
             raise ConfigError(f"{uri.text}: no device; for example serial:///dev/ttyACM0")
         calibration = uri.options.get("calibration")
-        self._calibration = load_calibration(file_path(calibration) if calibration else None)
+        self._calibration = load_calibration(named(calibration) if calibration else None)
         self.link = SerialLink(uri.path, link_timing(uri))
         # Every pattern ends exactly once, in the order of the wishes: counting tells whom a report is about.
         self._asked = self._ended = self._given_up = 0

@@ -16,6 +16,8 @@ import numpy as np
 from human_relay.sources.base import HandPose
 from human_relay.sources.playback import RATE_HZ, Playback
 from shared.clock import NS_PER_S
+from shared.errors import ConfigError
+from shared.files import named
 from shared.messages import Wish
 from shared.recordings.check import gap_ns
 from shared.recordings.flight_folder import HAND_FILE, read_meta, read_obstacles, read_track
@@ -83,7 +85,9 @@ def _about(rate_hz: float) -> tuple[str, ...]:
 
 
 def _path(uri: Uri) -> Path:
-    return uri.file("recording:flights/S2_visual_1")
+    if not uri.path or "\0" in uri.path:
+        raise ConfigError(f"{uri.text}: no path; for example recording:flights/S2_visual_1")
+    return named(uri.literal)
 
 
 def _poses(track: Track, start_ns: int, lead_ns: int, speed: float) -> Iterator[HandPose]:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from observer.console.swarm_view import Frames
 from shared.errors import ConfigError
+from shared.files import read_text
 
 PATTERN_FILE = "patterns.json"
 
@@ -35,7 +36,7 @@ def read_patterns(path: Path) -> Patterns:
         ConfigError: It is missing or is no pattern file.
     """
     try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
+        tree = json.loads(read_text(path))
         frames = {
             str(name): [
                 {"ms": int(f["ms"]), "hz": {str(k): float(hz) for k, hz in f["hz"].items()}} for f in rows

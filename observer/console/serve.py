@@ -27,6 +27,7 @@ from observer.console.tls import certificate
 from observer.swarm import open_observer
 from shared.clock import system_clock
 from shared.errors import ConfigError, DeviceError
+from shared.files import read_text
 from shared.formation import build_formation
 from shared.nodes import LOOPBACK
 from shared.private_socket import PrivateSender
@@ -102,8 +103,8 @@ def find_token(choice: str | None) -> str | None:
         token = os.environ.get(TOKEN_VARIABLE)
     elif choice.startswith("@"):
         try:
-            token = Path(choice[1:]).read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError) as error:
+            token = read_text(Path(choice[1:])).strip()
+        except (OSError, ValueError) as error:
             raise ConfigError(f"--token {choice}: {error}") from error
     else:
         raise ConfigError(f"--token: expected {RANDOM_TOKEN} or @FILE; others can read command lines")

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shared.errors import ConfigError
+from shared.files import read_bytes
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -78,6 +79,6 @@ def _load(file: Path) -> "x509.Certificate":
     from cryptography import x509  # noqa: PLC0415
 
     try:
-        return x509.load_pem_x509_certificate(file.read_bytes())
+        return x509.load_pem_x509_certificate(read_bytes(file))
     except (OSError, ValueError, x509.InvalidVersion) as error:
         raise ConfigError(f"{file}: not a certificate ({error})") from error

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shared.errors import ConfigError
+from shared.files import encoding_of
 from shared.recordings.track import NO_STAMP, Stamps, Vec
-from shared.text_file import encoding_of
 
 MOST_LINES = 2_000_000
 """Of one file: nine hours at 60 Hz."""

@@ -14,11 +14,11 @@ import numpy as np
 from attrs import frozen
 
 from shared.errors import ConfigError
+from shared.files import read_text
 from shared.recordings.check import ROOM, Checked, check
 from shared.recordings.csv_table import read_header, read_table
 from shared.recordings.track import NO_STAMP, Found, Stamps, Track, Vec
 from shared.scenario import Obstacle, Pair
-from shared.text_file import read_text
 
 HAND_FILE = "glove.csv.gz"
 PATTERN_FILE = "pattern_topic.csv.gz"

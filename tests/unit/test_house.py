@@ -33,6 +33,7 @@ PURE = [
     *sorted((ROOT / "observer/path").glob("*.py")),
     *(ROOT / f"observer/report/{name}.py" for name in ("record", "tables", "page")),
     *(ROOT / f"observer/console/{name}.py" for name in ("access", "notices", "ownership", "protocol", "scene")),
+    *(ROOT / f"shared/recordings/{name}.py" for name in ("check", "track")),
     ROOT / "deploy/status/report.py",
     *(
         ROOT / f"shared/{name}.py"
@@ -50,6 +51,7 @@ PURE = [
             "radio_link",
             "scenario",
             "shapes",
+            "spreadsheet",
             "topics",
             "uri",
         )
@@ -103,6 +105,58 @@ def test_a_pure_core_opens_nothing(path: Path) -> None:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     ]
     assert not {"open", "print", "input"} & set(calls)
+
+
+TEXT_FILES = {"open", "read_text", "write_text", "fdopen", "NamedTemporaryFile", "TextIOWrapper"}
+"""Functions that open text files, unless they are told otherwise."""
+
+
+def says_encoding(call: ast.Call) -> bool:
+    keywords = {keyword.arg for keyword in call.keywords}
+    modes = [*call.args, *(keyword.value for keyword in call.keywords if keyword.arg == "mode")]
+    is_binary = any(isinstance(m, ast.Constant) and isinstance(m.value, str) and "b" in m.value for m in modes)
+    return is_binary or "encoding" in keywords or None in keywords
+
+
+def leaves_encoding_to_the_locale(call: ast.Call) -> bool:
+    keywords, function = {keyword.arg for keyword in call.keywords}, call.func
+    name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+    owner = ast.unparse(function.value) if isinstance(function, ast.Attribute) else ""
+    if owner == "subprocess":
+        return bool({"text", "universal_newlines"} & keywords) and "encoding" not in keywords
+    if name not in TEXT_FILES or (name == "open" and owner in ("os", "zenoh", "self", "console")):
+        return False
+    if not owner and name != "open":  # our own `read_text` looks for itself
+        return False
+    if name == "open" and owner and not call.args and "newline" not in keywords:
+        return owner.endswith(("path", "file"))
+    return not says_encoding(call)
+
+
+@pytest.mark.parametrize("path", sources(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_text_is_read_or_written_in_the_encoding_of_the_locale(path: Path) -> None:
+    calls = [node for node in ast.walk(ast.parse(path.read_bytes())) if isinstance(node, ast.Call)]
+    assert [ast.unparse(call) for call in calls if leaves_encoding_to_the_locale(call)] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "leaves"),
+    [
+        ("path.read_text()", True),
+        ("path.open()", True),
+        ("path.open('w', newline='')", True),
+        ("open(name)", True),
+        ("subprocess.run(command, text=True)", True),
+        ("os.fdopen(descriptor, 'w')", True),
+        ("path.read_text(encoding='utf-8')", False),
+        ("path.open('rb')", False),
+        ("subprocess.run(command, text=True, encoding='utf-8')", False),
+        ("console.open()", False),
+    ],
+)
+def test_the_check_of_encodings_finds_what_it_is_to_find(text: str, *, leaves: bool) -> None:
+    (call,) = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call))
+    assert leaves_encoding_to_the_locale(call) is leaves
 
 
 def test_only_the_bus_knows_zenoh() -> None:

@@ -1,7 +1,8 @@
-"""Text files from anywhere: whatever encoding an editor has chosen, and no more than a stated size."""
+"""Files from anywhere: as people name them, in whatever encoding, and no more of them than a stated size."""
 
 import codecs
 from pathlib import Path
+from urllib.parse import unquote
 
 LARGEST = 1 << 24
 """Bytes of the largest file that is read at once: no configuration of ours is nearly as long."""
@@ -14,6 +15,12 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+
+
+def named(text: str) -> Path:
+    """Returns the file or folder of a name, or of the percent-decoded name if only that is there."""
+    path, decoded = (Path(name).expanduser() for name in (text, unquote(text)))
+    return decoded if not path.exists() and decoded.exists() else path
 
 
 def encoding_of(head: bytes) -> str:

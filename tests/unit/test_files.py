@@ -1,0 +1,131 @@
+"""Files as editors leave them: marks, UTF-16, foreign line ends; and ones that have no end."""
+
+import gzip
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from glove_bridge.calibration_file import SHIPPED, load_calibration
+from glove_bridge.patterns import FOLDER, load_patterns
+from observer.console.serve import find_token
+from shared.config import SCENARIOS, load_scenario
+from shared.errors import ConfigError
+from shared.files import LARGEST, encoding_of, read_text
+from shared.recordings.csv_table import LONGEST_LINE, MOST_CHARACTERS, MOST_LINES, read_table
+from shared.recordings.flight_folder import read_track
+from shared.recordings.hand import read_hand
+from tests.flight_folders import write_flight
+
+ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32")
+TOML = [*sorted(SCENARIOS.glob("*.toml")), SHIPPED, *sorted(FOLDER.glob("*.toml"))]
+ROWS = "t,x,y,z,note\n" + "".join(f"{k / 60:.4f},0,0,1.2,ü\n" for k in range(60))
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_an_encoding_is_told_by_the_first_bytes(tmp_path: Path, encoding: str, ending: str) -> None:
+    path = tmp_path / "text"
+    path.write_bytes(f"tä{ending}b{ending}".encode(encoding))
+    if encoding in ("utf-16-le", "utf-16-be"):
+        path.write_bytes(f"t{ending}b{ending}".encode(encoding))
+        assert read_text(path) == "t\nb\n"
+    else:
+        assert read_text(path) == "tä\nb\n"
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_hand_is_read_in_any_encoding(tmp_path: Path, encoding: str, *, packed: bool) -> None:
+    path, data = tmp_path / "hand.csv", ROWS.encode(encoding)
+    path.write_bytes(gzip.compress(data) if packed else data)
+    hand = read_hand(path)
+    assert len(hand.checked.rows) == 60
+    path.write_bytes((ROWS + "1.5,0,oops,1.2,ü\n").encode(encoding))
+    with pytest.raises(ConfigError, match="line 62: could not convert string to float: 'oops'"):
+        read_hand(path)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize(
+    "file", [*sorted(SCENARIOS.glob("*.toml")), SHIPPED, *sorted(FOLDER.glob("*.toml"))], ids=lambda f: f.name
+)
+def test_every_toml_is_read_in_any_encoding(tmp_path: Path, file: Path, encoding: str) -> None:
+    loaders: dict[Path, Callable[[Path], object]] = {
+        SCENARIOS: load_scenario,
+        SHIPPED.parent: load_calibration,
+        FOLDER: load_patterns,
+    }
+    load = loaders[file.parent]
+    path = tmp_path / file.name
+    path.write_bytes(file.read_text(encoding="utf-8").encode(encoding))
+    assert load(path) == load(file)
+
+
+def test_a_token_is_read_as_notepad_writes_it(tmp_path: Path) -> None:
+    path = tmp_path / "token"
+    path.write_bytes("0123456789abcdef\r\n".encode("utf-8-sig"))
+    assert find_token(f"@{path}") == "0123456789abcdef"
+
+
+@pytest.mark.parametrize("data", [b"\xff\xfe\x00", b"caf\xe9 = 1", b"\x80\x81", b"a\0\0"])
+def test_what_is_no_text_is_refused_with_what_to_do(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "scenario.toml"
+    path.write_bytes(data)
+    with pytest.raises(ConfigError, match=r"scenario\.toml"):
+        load_scenario(path)
+
+
+@pytest.mark.parametrize("load", [load_scenario, load_calibration, load_patterns, read_hand])
+def test_a_file_without_an_end_is_refused(load: object) -> None:
+    assert callable(load)
+    with pytest.raises(ConfigError):
+        load(Path("/dev/zero"))
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (lambda: bytes(200 << 20), f"longer than {LONGEST_LINE}"),
+        (lambda: b"\n" * (50 << 20), "too long a file; at most 20000 lines"),
+        (lambda: b"1,0.1,0.2,1.2\n" * (4 << 20), "too long a file; at most 20000 lines"),
+    ],
+    ids=["one line", "blank lines", "rows"],
+)
+def test_a_gzipped_table_that_grows_without_end_is_refused_in_little_memory(
+    tmp_path: Path, content: Callable[[], bytes], expected: str
+) -> None:
+    path = tmp_path / "table.csv.gz"
+    path.write_bytes(gzip.compress(b"t,x,y,z\n" + content(), compresslevel=1))
+    assert path.stat().st_size < 2 << 20
+    tracemalloc.start()
+    with pytest.raises(ConfigError, match=expected):
+        read_table(path, numbers=("t", "x", "y", "z"), most=20_000)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10 << 20
+    assert MOST_LINES * LONGEST_LINE > MOST_CHARACTERS, "a long file of long lines ends, too"
+
+
+@pytest.mark.parametrize("name", ["glove.csv.gz", "cf1.csv.gz"])
+def test_a_packed_table_that_is_cut_off_is_read_up_to_there(tmp_path: Path, name: str) -> None:
+    path = write_flight(tmp_path) / name
+    whole, data = read_track(path), path.read_bytes()
+    counts = []
+    for size in range(0, len(data), len(data) // 30):
+        path.write_bytes(data[:size])
+        try:
+            track = read_track(path)
+        except ConfigError:
+            counts.append(0)
+            continue
+        counts.append(len(track.t_ns))
+        assert track.t_ns.tolist() == whole.t_ns[: len(track.t_ns)].tolist()
+    assert counts == sorted(counts)
+    assert counts[-1] > 0.8 * len(whole.t_ns)
+
+
+def test_the_largest_file_of_ours_is_far_within_the_bound() -> None:
+    assert max(path.stat().st_size for path in SCENARIOS.iterdir()) < LARGEST / 1_000
+    assert encoding_of(b"") == "utf-8"
