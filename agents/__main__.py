@@ -10,13 +10,13 @@ from agents.settings import agent_settings
 from agents.vehicles import open_vehicle
 from shared.bus import join
 from shared.clock import system_clock
-from shared.config import vehicle_settings
 from shared.errors import SwarmTouchError
 from shared.nodes import drone_node
 from shared.process import StatusReporter, add_process_arguments, explain, prepare_process, tell_form
-from shared.scenario_check.check import check_drone, open_scenario
+from shared.scenario_check.checked import check_drone, open_checked
 from shared.topics import DRONE_STATE
 from shared.transport import Inbox
+from shared.vehicles import vehicle_settings
 
 
 def main() -> int:
@@ -25,7 +25,7 @@ def main() -> int:
     stopping = prepare_process(f"drone/{args.id}", verbose=args.verbose)
     clock = system_clock()
     try:
-        scenario, formation = open_scenario(args.scenario, args.set)
+        scenario, formation = open_checked(args.scenario, args.set)
         check_drone(formation, args.id, args.scenario)
         settings = agent_settings(scenario, formation, args.id)
         agent = Agent(scenario, formation, args.id, settings, epoch=clock())

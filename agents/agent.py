@@ -12,7 +12,6 @@ from agents.control.step import Inputs, Settings, State, start, step
 from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
-from shared.config import vehicle_settings
 from shared.fence import bodies_of
 from shared.formation import Formation
 from shared.messages import NO_HAND, DroneState, Flag, HandSample, Heard
@@ -22,6 +21,7 @@ from shared.scenario import Scenario
 from shared.senses import Sensed, Senses
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
+from shared.vehicles import vehicle_settings
 
 NEVER = float("inf")
 HAND_KEY = HAND.key()

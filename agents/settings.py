@@ -9,11 +9,11 @@ from agents.control.impedance import Link, Spring
 from agents.control.repair import Kin, kin_order
 from agents.control.steering import Columns, SteeringSettings
 from agents.control.step import Settings
-from shared.config import vehicle_settings
 from shared.fence import goal_box, hand_box
 from shared.formation import Formation
 from shared.messages import Vector
 from shared.scenario import FieldSettings, Hand, Scenario
+from shared.vehicles import vehicle_settings
 
 
 def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Settings:

@@ -15,7 +15,7 @@ from shared.errors import SwarmTouchError
 from shared.net.keyring import hand_signer
 from shared.nodes import RELAY
 from shared.process import add_process_arguments, explain, prepare_process
-from shared.scenario_check.check import open_scenario
+from shared.scenario_check.checked import open_checked
 
 _EXAMPLE = """example: python -m human_relay --scenario rhombus --hand "scripted:tour?peak=0.4"
 Orders are lines on standard input: fly, hold, land, stop (stop is final)."""
@@ -27,7 +27,7 @@ def main() -> int:
     stopping = prepare_process(RELAY, verbose=arguments.verbose)
     clock = system_clock()
     try:
-        scenario, formation = open_scenario(arguments.scenario, arguments.set)
+        scenario, formation = open_checked(arguments.scenario, arguments.set)
         with (
             join(scenario, formation, RELAY, audited=True) as bus,
             closing(_open_hand(arguments, clock())) as source,

@@ -18,7 +18,7 @@ from cattrs.cols import homogenous_tuple_structure_factory
 from cattrs.gen import make_dict_structure_fn
 
 from shared.errors import ConfigError
-from shared.scenario import Scenario, VehicleSettings
+from shared.scenario import Scenario
 from shared.toml_text import parse_toml, read_toml
 
 T = TypeVar("T")
@@ -100,33 +100,6 @@ def dump_scenario(scenario: Scenario) -> str:
 def dump(settings: attrs.AttrsInstance) -> str:
     """Writes any configuration class as TOML that `structure` reads back to an equal one."""
     return tomli_w.dumps(_without_none(_converter.unstructure(settings)))
-
-
-def vehicle_settings(scenario: Scenario, drone: int) -> VehicleSettings:
-    """Resolves one drone's vehicle: robot over type over all.
-
-    Args:
-        scenario: The scenario.
-        drone: Number of the drone.
-
-    Returns:
-        Every setting filled in; `{id}` in the URI replaced.
-    """
-    vehicles = scenario.vehicles
-    robot = vehicles.robots.get(str(drone), VehicleSettings())
-    kind = vehicles.types.get(robot.type or vehicles.all.type or "", VehicleSettings())
-    layers = (robot, kind, vehicles.all, _VEHICLE_DEFAULTS)
-    chosen: dict[str, Any] = {
-        a.name: next((v for layer in layers if (v := getattr(layer, a.name)) is not None), None)
-        for a in attrs.fields(VehicleSettings)
-    }
-    uri = str(chosen["uri"]).replace("{id}", str(drone))
-    return VehicleSettings(**{**chosen, "uri": uri})
-
-
-_VEHICLE_DEFAULTS = VehicleSettings(
-    uri="sim://127.0.0.1:7400/{id}", body="identified", link_loss="crazyflie", tau=0.45
-)
 
 
 def _apply_override(tree: dict[str, Any], item: str) -> None:

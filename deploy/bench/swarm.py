@@ -25,6 +25,7 @@ from shared.errors import SwarmTouchError
 from shared.formation import Formation
 from shared.nodes import OBSERVER, RELAY, all_nodes
 from shared.scenario import Scenario
+from shared.scenario_check.checked import leave_checked
 from shared.transport import Bus
 
 HAND = "scripted:tour"
@@ -104,6 +105,7 @@ def fly(
         run_dir = recorded_to or Path(folder)
         file = run_dir / SCENARIO_FILE
         file.write_text(dump_scenario(scenario), encoding="utf-8")
+        leave_checked(file, scenario)
         record = recorded_to is not None
         rows = process_table(scenario, formation, file=file, hand=HAND, run_dir=run_dir, record=record)
         ear = FlightEar(bus, formation)

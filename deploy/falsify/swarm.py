@@ -20,12 +20,12 @@ from deploy.lockstep.start import EPOCH, introduce, rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.arrays import Vec
 from shared.clock import NS_PER_S
-from shared.config import vehicle_settings
 from shared.formation import Formation
 from shared.messages import DroneState, HandSample, Mode, Vector
 from shared.nodes import neighbours
 from shared.scenario import Scenario
 from shared.scenario_check.check import open_scenario
+from shared.vehicles import vehicle_settings
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 

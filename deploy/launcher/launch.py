@@ -43,6 +43,7 @@ from shared.formation import Formation
 from shared.nodes import LOOPBACK, OBSERVER, all_nodes
 from shared.scenario import Scenario
 from shared.scenario_check.check import open_scenario
+from shared.scenario_check.checked import leave_checked
 
 SUMMARY_FILE = "summary.json"
 
@@ -96,6 +97,7 @@ def launch(options: Options) -> Json:
         console = open_console(err if options.json else out)
         run_dir = create_run_directory(options.runs, lambda text: _say(console, text))
         write_run_file(run_dir / SCENARIO_FILE, dump_scenario(scenario))
+        leave_checked(run_dir / SCENARIO_FILE, scenario)
         outcome, summary = asyncio.run(_fly(options, scenario, formation, hand, run_dir, console))
         print_summary(summary, console)
         line = f"{json.dumps(summary)}\n"

@@ -9,11 +9,11 @@ from typing import Any
 import attrs
 from attrs import frozen
 
-from shared.config import vehicle_settings
 from shared.formation import Formation
 from shared.nodes import BRIDGE, CONSOLE, DRONE, OBSERVER, RELAY, WORLD, all_nodes, loopback
 from shared.radio_link import GROUP
 from shared.scenario import Scenario
+from shared.vehicles import vehicle_settings
 
 
 @frozen(kw_only=True)

@@ -7,12 +7,12 @@ from agents.agent import Agent
 from agents.control.hand import MappedHand
 from agents.control.vectors import rotate
 from agents.vehicles.bodies.fleet import Flyer, hover, park_fleet, pose_of
-from shared.config import vehicle_settings
 from shared.formation import Formation
 from shared.messages import ORIGIN, DroneState, Mode, Vector
 from shared.scenario import Scenario
 from shared.senses import Sensed
 from shared.topics import DRONE_STATE
+from shared.vehicles import vehicle_settings
 
 EPOCH = 1
 """Of agents in lockstep; what they heard of each other before is older."""

@@ -6,10 +6,10 @@ from deploy.launcher.monitor import Monitor
 from deploy.status.report import Heard, Row, expected_processes, rows_of
 from observer.swarm import open_observer
 from shared.clock import system_clock
-from shared.config import vehicle_settings
 from shared.formation import build_formation
 from shared.nodes import DRONE
 from shared.scenario import Scenario
+from shared.vehicles import vehicle_settings
 
 LONGEST_S = 4.0
 """Links come within a second, health once a second."""

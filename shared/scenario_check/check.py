@@ -50,14 +50,3 @@ def open_scenario(
     if findings:
         raise ConfigError("\n".join(f"{source}: {finding}" for finding in findings))
     return scenario, formation
-
-
-def check_drone(formation: Formation, drone: int, origin: str) -> None:
-    """Looks whether a drone that somebody named is in the formation.
-
-    Raises:
-        ConfigError: It is not.
-    """
-    if drone not in formation.ids:
-        drones = ", ".join(map(str, formation.ids))
-        raise ConfigError(f"{origin}: no drone {drone} in this formation; its drones are {drones}")

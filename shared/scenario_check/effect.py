@@ -8,7 +8,6 @@ from typing import Any
 
 import attrs
 
-from shared.config import vehicle_settings
 from shared.formation import Formation
 from shared.scenario import (
     Avoidance,
@@ -21,6 +20,7 @@ from shared.scenario import (
     VehicleSettings,
 )
 from shared.scenario_check.finding import Finding
+from shared.vehicles import vehicle_settings
 
 _OF_SIMULATED = ("body", "link_loss", "battery", "endurance", "pose_silence")
 

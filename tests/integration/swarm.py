@@ -21,6 +21,7 @@ from shared.messages import Mode
 from shared.nodes import all_nodes
 from shared.process import LAUNCHER_PID
 from shared.scenario import Scenario
+from shared.scenario_check.checked import leave_checked
 from tests.integration.recorder import RELAY, START_S, Recorder
 
 
@@ -42,6 +43,7 @@ class Swarm:
         self._folder = folder
         file = folder / "scenario.toml"
         file.write_text(dump_scenario(self.scenario), encoding="utf-8")
+        leave_checked(file, self.scenario)
         rows = process_table(self.scenario, formation, file=file, hand=hand, run_dir=folder)
         self._rows: dict[str, ProcessRow] = {row.token: row for row in rows}
         self.processes: dict[str, subprocess.Popen[bytes]] = {}

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from agents.vehicles import open_vehicle
-from shared.config import vehicle_settings
 from shared.messages import Flag, Mode
+from shared.vehicles import vehicle_settings
 from tests.integration.recorder import RELAY, START_S, WORLD, Recorder, slowest_rate_hz
 from tests.integration.swarm import Swarm, launched, swarm_of
 

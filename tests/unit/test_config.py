@@ -7,17 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.config import (
-    SCENARIOS,
-    dump_scenario,
-    find_scenario,
-    load_scenario,
-    structure_scenario,
-    vehicle_settings,
-)
+from shared.config import SCENARIOS, dump_scenario, find_scenario, load_scenario, structure_scenario
 from shared.errors import ConfigError
 from shared.formation import build_formation
 from shared.scenario import Scenario
+from shared.vehicles import vehicle_settings
 
 SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 

@@ -10,11 +10,12 @@ import pytest
 from deploy.launcher.ports import free_ports
 from deploy.launcher.process_table import ProcessRow, hint_overrides, process_table, resolve_scenario
 from deploy.launcher.run_directory import create_run_directory
-from shared.config import dump_scenario, load_scenario, structure_scenario, vehicle_settings
+from shared.config import dump_scenario, load_scenario, structure_scenario
 from shared.errors import ConfigError
 from shared.formation import build_formation
 from shared.nodes import all_nodes, dials, endpoint
 from shared.scenario import Scenario
+from shared.vehicles import vehicle_settings
 
 RHOMBUS = load_scenario("rhombus")
 FORMATION = build_formation(RHOMBUS)

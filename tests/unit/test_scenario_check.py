@@ -26,7 +26,8 @@ from shared.fence import fence_box
 from shared.formation import Formation, Link, build_formation
 from shared.nodes import all_nodes
 from shared.scenario import Scenario
-from shared.scenario_check.check import check_drone, check_scenario, open_scenario
+from shared.scenario_check.check import check_scenario, open_scenario
+from shared.scenario_check.checked import check_drone
 from shared.scenario_check.network import largest_displacement
 
 SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))

@@ -9,13 +9,13 @@ from agents.vehicles.bodies.fleet import Fleet, park_fleet
 from agents.vehicles.sim import parse_uri
 from agents.vehicles.world.faults import Faults, faults_of
 from agents.vehicles.world.referee import Rules
-from shared.config import vehicle_settings
 from shared.cylinders import columns_of
 from shared.errors import ConfigError
 from shared.fence import fence_box
 from shared.formation import Formation, build_formation
 from shared.messages import Vector
 from shared.scenario import Scenario
+from shared.vehicles import vehicle_settings
 
 
 @frozen(eq=False)
