@@ -12,7 +12,7 @@ from agents.vehicles import BACKENDS, open_vehicle
 from agents.vehicles.base import Pose, Vehicle
 from agents.vehicles.bodies.fleet import park_fleet
 from agents.vehicles.sim import SimVehicle
-from agents.vehicles.world.radio import Radio
+from agents.vehicles.world.radio import DRIVER_SILENT_S, Radio
 from agents.vehicles.world.referee import Rules
 from agents.vehicles.world.world import TICK, World
 from shared.errors import ConfigError
@@ -201,7 +201,9 @@ def test_a_new_driver_takes_over_in_the_air(sim: SimStage) -> None:
     take_off(sim)
     sim.vehicle.close()
     sim.vehicle = sim.open_driver()
-    sim.run(0.1, nothing)
+    sim.run(DRIVER_SILENT_S - 0.1, nothing)
+    assert sim.vehicle.pose() is None, "the one before may only have stuttered"
+    sim.run(0.4, nothing)
     assert reported(sim).airborne
     sim.run(3.0, lambda: sim.vehicle.fly(ABOVE))
     assert reported(sim).position == pytest.approx(ABOVE, abs=0.1)

@@ -14,7 +14,7 @@ from agents.vehicles.bodies.state import Command
 from agents.vehicles.link import Verb, decode_pose, encode_order
 from agents.vehicles.world.faults import faults_of
 from agents.vehicles.world.hand import HandWatch
-from agents.vehicles.world.radio import Radio
+from agents.vehicles.world.radio import DRIVER_SILENT_S, Radio
 from agents.vehicles.world.record import RefereeFile
 from agents.vehicles.world.referee import Rules
 from agents.vehicles.world.setup import plan_world
@@ -82,19 +82,29 @@ def test_hello_is_no_command(radio: Radio, driver: socket.socket) -> None:
     assert radio.command(2, 10.1)[0] == Command.FLY
 
 
-def test_poses_go_to_whoever_spoke_last(radio: Radio, driver: socket.socket) -> None:
+def test_a_body_belongs_to_whoever_speaks_for_it_until_that_is_silent(
+    radio: Radio, driver: socket.socket
+) -> None:
     world = make_world(radio)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.sendto(encode_order(2, Verb.HELLO), ("127.0.0.1", radio.port))
-        radio.receive(10.0)
+        other.settimeout(5.0)
         driver.send(encode_order(2, Verb.HELLO))
+        driver.send(encode_order(2, Verb.FLY, (1.0, 0.0, 1.0)))
+        radio.receive(10.0)
+        for verb in (Verb.HELLO, Verb.STOP, Verb.FLY):
+            other.sendto(encode_order(2, verb), ("127.0.0.1", radio.port))
+        other.sendto(encode_order(1, Verb.HELLO), ("127.0.0.1", radio.port))
+        radio.receive(10.0 + DRIVER_SILENT_S)
+        assert radio.command(2, 10.0) == (Command.FLY, (1.0, 0.0, 1.0))
+        assert radio.rejected == {"not-its-driver": 3}
         world.run_until(10.0 + TICK)
-        drone, pose = decode_pose(driver.recv(128))
-        other.setblocking(False)
-        with pytest.raises(BlockingIOError):
-            other.recv(128)
-    assert drone == 2
-    assert pose.position == (1.0, 0.0, 0.0)
+        assert decode_pose(driver.recv(128))[0] == 2
+        assert decode_pose(other.recv(128))[0] == 1
+
+        other.sendto(encode_order(2, Verb.HELLO), ("127.0.0.1", radio.port))
+        radio.receive(10.1 + DRIVER_SILENT_S)
+        world.run_until(10.2 + DRIVER_SILENT_S)
+        assert {decode_pose(other.recv(128))[0] for _ in range(4)} == {1, 2}
 
 
 def test_ticks_follow_the_clock_however_often_it_is_asked(radio: Radio) -> None:

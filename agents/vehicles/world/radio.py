@@ -4,7 +4,7 @@ import math
 import socket
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping
-from typing import Self
+from typing import NamedTuple, Self
 
 from msgspec import Struct
 
@@ -18,6 +18,9 @@ from shared.messages import ORIGIN, Vector
 MAX_PER_CALL = 1024
 """Datagrams looked at per call: a flood of garbage costs commands, never the world's clock."""
 
+DRIVER_SILENT_S = 0.5
+"""A driver says something every 0.25 s at least; one that is silent for longer has let go of its body."""
+
 COMMAND_OF = {Verb.FLY: FLY, Verb.DESCEND: DESCEND, Verb.IDLE: IDLE, Verb.STOP: CUT}
 
 
@@ -29,10 +32,19 @@ class Told(Struct, frozen=True):
     at: float = -math.inf
 
 
+class Driver(NamedTuple):
+    """Who flies a body: address, and when last heard, monotonic, s."""
+
+    address: tuple[str, int]
+    heard: float
+
+
 class Radio:
     """One UDP socket for all drones.
 
-    Poses of a drone go to whoever last spoke for it, so drivers and world may start in any order.
+    Drivers and world may start in any order: a body belongs to whoever speaks for it first, gets its poses, and
+    is heard alone until silent for `DRIVER_SILENT_S`. So nobody else commands a body that is flown, as nobody
+    shares the radio channel of a real one.
 
     Args:
         address: Host and port to listen on; port 0 takes a free one.
@@ -49,7 +61,7 @@ class Radio:
     def __init__(self, address: tuple[str, int], ids: Iterable[int], hovers: Container[int]) -> None:
         self._hovers = hovers
         self._told = {drone: Told() for drone in ids}
-        self._drivers: dict[int, tuple[str, int]] = {}
+        self._drivers: dict[int, Driver] = {}
         self.rejected: Counter[str] = Counter()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -95,7 +107,7 @@ class Radio:
             if drone not in reports:
                 continue
             try:
-                self._socket.sendto(encode_pose(drone, reports[drone]), driver)
+                self._socket.sendto(encode_pose(drone, reports[drone]), driver.address)
             except OSError:
                 self.rejected["unsent"] += 1
 
@@ -112,6 +124,9 @@ class Radio:
     def _obey(self, order: Order, sender: tuple[str, int], now: float) -> None:
         if order.drone not in self._told:
             raise DecodeError("unknown-drone", str(order.drone))
-        self._drivers[order.drone] = sender
+        driver = self._drivers.get(order.drone)
+        if driver and driver.address != sender and now - driver.heard <= DRIVER_SILENT_S:
+            raise DecodeError("not-its-driver", f"{sender} speaks for drone {order.drone}")
+        self._drivers[order.drone] = Driver(sender, now)
         if order.verb is not Verb.HELLO:
             self._told[order.drone] = Told(COMMAND_OF[order.verb], order.setpoint, now)
