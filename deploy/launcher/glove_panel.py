@@ -1,10 +1,14 @@
-"""Five fingers below the status table, drawn from the pattern events alone."""
+"""Five fingers below the status table, drawn from the pattern events; and what could not be felt by them."""
+
+from collections import Counter
+from collections.abc import Mapping
 
 from glove_bridge.gloves.terminal import draw
+from glove_bridge.loop import GLOVE_THERE
 from glove_bridge.patterns import CUES, load_patterns
 from glove_bridge.patterns.pattern import Frame, Pattern
 from shared.clock import Clock, system_clock
-from shared.messages import PatternEvent
+from shared.messages import PatternEvent, ProcessStatus
 
 _NS_PER_MS = 1_000_000
 
@@ -23,6 +27,9 @@ class GlovePanel:
     def __init__(self, patterns: str, clock: Clock | None = None) -> None:
         self._patterns = {**load_patterns(CUES).patterns, **load_patterns(patterns).patterns}
         self._clock = clock or system_clock()
+        self._cues = frozenset(load_patterns(CUES).patterns)
+        self._failed: Counter[str] = Counter()
+        self._is_there = True
 
     def line(self, latest: PatternEvent | None) -> str:
         """Draws the fingers and names the pattern.
@@ -36,6 +43,29 @@ class GlovePanel:
         playing = latest.outcome == "started"
         frame = _frame_at(pattern, self._clock() - latest.started_ns) if playing else None
         return f"glove  {draw(frame)}  {latest.pattern} {'' if frame else latest.outcome}".rstrip()
+
+    def unfelt(self, failed: Mapping[str, int], status: ProcessStatus | None) -> list[str]:
+        """Says what the operator has to be told otherwise, because it cannot be felt.
+
+        Args:
+            failed: How many patterns have failed so far, by name.
+            status: The newest health of the bridge, None before the first.
+
+        Returns:
+            News since the last call: whether there is a glove, and the safety cues that it has not played.
+        """
+        news = []
+        is_there = status is None or status.metrics.get(GLOVE_THERE, 1.0) > 0.0
+        if is_there != self._is_there:
+            self._is_there = is_there
+            news.append("the glove can be felt" if is_there else "the glove cannot be felt: see bridge.log")
+        news += [
+            f"NOT FELT: {name.lower().replace('_', ' ')}"
+            for name in sorted(self._cues)
+            if failed.get(name, 0) > self._failed[name]
+        ]
+        self._failed = Counter(failed)
+        return news
 
 
 def _frame_at(pattern: Pattern, elapsed_ns: int) -> Frame | None:

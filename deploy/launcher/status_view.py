@@ -17,7 +17,7 @@ from deploy.launcher.monitor import Monitor
 from deploy.terminal.job_control import in_foreground
 from shared.conditions import conditions
 from shared.messages import DroneState, ProcessStatus
-from shared.nodes import DRONE
+from shared.nodes import BRIDGE, DRONE
 
 LIVE_PERIOD_S = 0.5
 PLAIN_PERIOD_S = 5.0
@@ -147,6 +147,10 @@ class StatusView:
             self.event(flight.phase)
             self._due = now + self._period
         fingers = self._panel.line(flight.monitor.glove.latest) if self._panel else ""
+        if self._panel:
+            bridge = flight.monitor.health.get(f"{BRIDGE}/0")
+            for text in self._panel.unfelt(flight.monitor.glove.failed, bridge.status if bridge else None):
+                self.alarm(text)
         if now < self._due and (not self._live or fingers == self._fingers):
             return
         self._due, self._fingers = now + self._period, fingers
@@ -165,6 +169,12 @@ class StatusView:
     def event(self, text: str) -> None:
         """Prints one line that stays."""
         self._print(f"launcher | {text}")
+
+    def alarm(self, text: str) -> None:
+        """Prints one line that is heard as well, where there is a terminal."""
+        self.event(text)
+        if self._console.is_terminal:
+            self._console.bell()
 
     def _print(self, line: str) -> None:
         self._console.print(line, soft_wrap=True)

@@ -3,7 +3,9 @@
 import asyncio
 import contextlib
 import socket
+from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
@@ -18,11 +20,22 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from observer.console.access import is_own_host, is_same_site, is_token
 from observer.console.console import Console
+from observer.console.crowd import KEPT_S, Guest, Pace, Place, Places
 from observer.console.page_link import PageLink
 
 PAGE = Path(__file__).resolve().parent / "page"
-MOST_PAGES = 32
+LOOK_S = 0.5
+"""How often to look whether a page that has a kept place steers."""
+
 _TRY_AGAIN_LATER = 1013
+_FULL = "so many pages are open that only one that steers finds room"
+_STRANGER = (
+    "this console was started without a token, for one user of this machine: others come in by a token"
+    " (--token random)\n"
+)
+
+Guests = Callable[[tuple[str, int] | None], Guest | None]
+"""Who has come from an address; None if that is not known."""
 
 HEADERS = {
     "Content-Security-Policy": (
@@ -36,55 +49,87 @@ HEADERS = {
 """Sent with every answer: the page loads nothing from elsewhere and nobody frames it."""
 
 
-def make_app(console: Console, token: str | None) -> Starlette:
+def make_app(console: Console, token: str | None, guests: Guests = lambda _: None) -> Starlette:
     """Makes the application.
 
     Args:
         console: Whom the pages talk to.
-        token: What a page must know, None for everybody who can reach this machine's loopback.
+        token: What a page must know, None for whoever is no stranger.
+        guests: Who has come in by the door.
     """
+    places = Places()
 
     async def page(websocket: WebSocket) -> None:
-        await _serve_page(websocket, console)
+        guest = guests(websocket.scope.get("client"))
+        with _seated(places, guest) as place:
+            await _serve_page(websocket, console, place)
 
     return Starlette(
         routes=[WebSocketRoute("/ws", page), Mount("/", StaticFiles(directory=PAGE, html=True))],
-        middleware=[Middleware(Guard, token=token)],
+        middleware=[Middleware(Guard, token=token, guests=guests)],
     )
 
 
-async def _serve_page(websocket: WebSocket, console: Console) -> None:
+@contextlib.contextmanager
+def _seated(places: Places, guest: Guest | None) -> Iterator[Place | None]:
+    place = places.take(guest.origin if guest else "")
+    if guest and place:
+        guest.is_page = True
+    try:
+        yield place
+    finally:
+        if place:
+            places.leave(place)
+
+
+async def _serve_page(websocket: WebSocket, console: Console, place: Place | None) -> None:
     await websocket.accept()
-    if console.pages >= MOST_PAGES:
-        await websocket.close(_TRY_AGAIN_LATER, "too many pages are open")
+    if place is None:
+        await websocket.close(_TRY_AGAIN_LATER, _FULL)
         return
     link = console.open()
-    tasks = [
-        asyncio.create_task(_tell(websocket, link)),
-        asyncio.create_task(_listen(websocket, console, link)),
-    ]
+    work = [link.run(websocket.send_text), _listen(websocket, console, link)]
+    if place.is_kept:
+        work.append(_until_idle(console, link))
+    tasks = [asyncio.create_task(_until_gone(each)) for each in work]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
         console.close(link)
         for task in tasks:
             task.cancel()
+    with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # it has gone by itself
+        await websocket.close(_TRY_AGAIN_LATER, _FULL)
 
 
-async def _tell(websocket: WebSocket, link: PageLink) -> None:
+async def _until_gone(work: Coroutine[Any, Any, None]) -> None:
     with contextlib.suppress(WebSocketDisconnect):
-        await link.run(websocket.send_text)
-        await websocket.close(_TRY_AGAIN_LATER, "this page does not read what it is told")
+        await work
 
 
 async def _listen(websocket: WebSocket, console: Console, link: PageLink) -> None:
+    loop = asyncio.get_running_loop()
+    pace = Pace(loop.time())
     while (message := await websocket.receive())["type"] == "websocket.receive":
         text = message.get("text")
         console.hear(link, message.get("bytes", b"") if text is None else text)
+        await asyncio.sleep(pace.wait(loop.time()))
+
+
+async def _until_idle(console: Console, link: PageLink) -> None:
+    """Returns when a page has not steered for `KEPT_S`."""
+    loop = asyncio.get_running_loop()
+    steered = loop.time()
+    while loop.time() - steered < KEPT_S:
+        await asyncio.sleep(LOOK_S)
+        if console.steers(link):
+            steered = loop.time()
 
 
 class Guard:
     """Refuses with 403 whoever comes through a foreign name, from a foreign site, or without the token.
+
+    Where there is no token, it refuses the other users of this machine.
 
     The address that the console prints carries the token once; it is answered with a cookie that no script can
     read and no foreign site can use, and the token leaves the address bar.
@@ -92,11 +137,13 @@ class Guard:
     Args:
         app: What is guarded.
         token: The token, None for none.
+        guests: Who has come in by the door.
     """
 
-    def __init__(self, app: ASGIApp, token: str | None) -> None:
+    def __init__(self, app: ASGIApp, token: str | None, guests: Guests) -> None:
         self._app = app
         self._token = token
+        self._guests = guests
         name = socket.gethostname().lower()
         self._names = {name, name.partition(".")[0]}
 
@@ -117,7 +164,11 @@ class Guard:
             await self._app(scope, receive, _with_headers(send))
 
     def _refusal(self, scope: Scope, headers: Headers) -> str | None:
-        host = headers.get("host", "")
+        host, guest = headers.get("host", ""), self._guests(scope.get("client"))
+        if guest is not None:
+            guest.asked = True
+        if guest is not None and guest.is_stranger:
+            return _STRANGER
         if not is_own_host(host, self._names):
             return f"{host!r:.80} is no name of this machine; open the console by its address or as localhost\n"
         if scope["type"] == "websocket" and not is_same_site(headers.get("origin"), host):

@@ -80,28 +80,23 @@ class Console:
         self._notices = view.notices(clock())
         self._health_ns = self._notice_ns = self._pointed_ns = 0
 
-    @property
-    def pages(self) -> int:
-        """How many pages are open."""
-        return len(self._links)
-
     def open(self) -> PageLink:
         """Opens a page and tells it everything that is known."""
         self._opened += 1
         now = self._clock()
-        link = PageLink(self._opened)
+        link = PageLink(self._opened, encode({**self._scene, "you": self._opened}))
         self._own(join(self._owner, link.number))
         self._links[link.number] = link
-        for message in (
-            {**self._scene, "you": link.number},
+        playing = self.view.playing(now)
+        if playing is not None:
+            link.tell(encode(playing))
+        for state in (
             self._control,
             self._current_notices(now),
             self.view.health(now),
-            self.view.playing(now),
             self.view.snapshot(now),
         ):
-            if message is not None:
-                link.tell(encode(message))
+            link.show(state["type"], encode(state))
         return link
 
     def close(self, link: PageLink) -> None:
@@ -109,6 +104,15 @@ class Console:
         del self._links[link.number]
         self._own(leave(self._owner, link.number))
         self._send_hand(self._clock())
+
+    @property
+    def pages(self) -> int:
+        """How many pages are open."""
+        return len(self._links)
+
+    def steers(self, link: PageLink) -> bool:
+        """Says whether a page holds the hand, or asks for it."""
+        return link.number == self._owner.holder or link.number in self._owner.asking
 
     def hear(self, link: PageLink, text: str | bytes) -> None:
         """Takes a message of a page; whatever is wrong with it is answered, not raised."""
@@ -133,9 +137,7 @@ class Console:
         if not self._links:
             return
         if arrivals:
-            snapshot = encode(self.view.snapshot(now))
-            for link in self._links.values():
-                link.show(snapshot)
+            self._show(self.view.snapshot(now))
         self._tell_slow_news(now)
 
     def _tell_slow_news(self, now: int) -> None:
@@ -144,10 +146,10 @@ class Console:
             current = self._current_notices(now)
             if current != self._notices:
                 self._notices = current
-                self._tell(current)
+                self._show(current)
         if now - self._health_ns >= _HEALTH_PERIOD_NS:
             self._health_ns = now
-            self._tell(self.view.health(now))
+            self._show(self.view.health(now))
 
     def _obey(self, page: int, request: Request, now: int) -> Ownership:
         owner, seconds = self._owner, now / NS_PER_S
@@ -169,7 +171,7 @@ class Console:
         control = self._control_message()
         if control != self._control:
             self._control = control
-            self._tell(control)
+            self._show(control)
 
     def _control_message(self) -> Json:
         owner = self._owner
@@ -209,10 +211,15 @@ class Console:
             return self.view.hand_position or self._hand.real(self._hand.start)
         return self._hand.real(point)
 
-    def _tell(self, message: Json) -> None:
-        text = encode(message)
+    def _tell(self, event: Json) -> None:
+        text = encode(event)
         for link in self._links.values():
             link.tell(text)
+
+    def _show(self, state: Json) -> None:
+        text = encode(state)
+        for link in self._links.values():
+            link.show(state["type"], text)
 
 
 async def run(console: Console, bus: Bus, inbox: Inbox, clock: Clock, stopping: threading.Event) -> None:

@@ -7,19 +7,24 @@ import os
 import secrets
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import uvicorn
 from attrs import frozen
+from starlette.types import ASGIApp
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from observer.console import PORT
 from observer.console.access import is_loopback
 from observer.console.app import make_app
 from observer.console.arguments import RANDOM_TOKEN, TOKEN_VARIABLE
 from observer.console.console import Console, run
+from observer.console.door import Door
 from observer.console.pattern_file import NO_PATTERNS, Patterns, read_patterns
+from observer.console.peer import Peers
 from observer.console.protocol import MAX_MESSAGE
 from observer.console.scene import HandMap
 from observer.console.swarm_view import SwarmView
@@ -38,6 +43,9 @@ from shared.transport import Inbox
 SHORTEST_TOKEN = 8
 _DEPTH = 64
 _PING_S = 5.0
+_LONGEST_HEAD = 16_384
+_BACKLOG = 64
+_TOKEN_HINT = f"this system does not tell them apart; --token {RANDOM_TOKEN} does"
 
 
 @frozen(kw_only=True)
@@ -135,28 +143,58 @@ async def _serve(
         sender=secrets.randbits(64),
         clock=clock,
     )
-    server = uvicorn.Server(_config(console, token, pair))
     inbox = Inbox(clock, _DEPTH)
     with open_observer(scenario) as bus:
         for key in view.keys:
             bus.subscribe(key, inbox)
         bus.watch_presence(view.presence_changed)
-        pages = asyncio.create_task(server.serve(sockets=[listener]))
-        pages.add_done_callback(lambda _: stopping.set())
-        await run(console, bus, inbox, clock, stopping)
+        async with _open_to_pages(console, listener, token, pair, stopping):
+            await run(console, bus, inbox, clock, stopping)
+
+
+@contextlib.asynccontextmanager
+async def _open_to_pages(
+    console: Console,
+    listener: socket.socket,
+    token: str | None,
+    pair: tuple[Path, Path] | None,
+    stopping: threading.Event,
+) -> AsyncIterator[None]:
+    """Serves pages meanwhile; whatever ends the server ends the console."""
+    peers = None if token else Peers()
+    if peers and not peers.works:
+        print(f"console | all users of this machine may come in: {_TOKEN_HINT}", flush=True)
+    door = Door(listener, peers)
+    config = _config(make_app(console, token, door.guest), pair)
+    config.load()
+    server = uvicorn.Server(config)
+    protocol = partial(H11Protocol, config=config, server_state=server.server_state, app_state={})
+    serving = asyncio.create_task(server.serve(sockets=[]))
+    letting_in = asyncio.create_task(door.run(protocol, config.ssl))
+    for task in (serving, letting_in):
+        task.add_done_callback(lambda _: stopping.set())
+    try:
+        yield
+    finally:
         server.should_exit = True
-        await pages
+        await serving
+        letting_in.cancel()
+        if peers:
+            peers.close()
 
 
-def _config(console: Console, token: str | None, pair: tuple[Path, Path] | None) -> uvicorn.Config:
+def _config(app: ASGIApp, pair: tuple[Path, Path] | None) -> uvicorn.Config:
     tls: dict[str, Any] = {"ssl_certfile": pair[0], "ssl_keyfile": pair[1]} if pair else {}
     return uvicorn.Config(
-        make_app(console, token),
+        app,
         lifespan="off",
+        http=H11Protocol,
+        ws="websockets-sansio",
         log_config=None,
         log_level=logging.WARNING,
         access_log=False,
         server_header=False,
+        h11_max_incomplete_event_size=_LONGEST_HEAD,
         ws_max_size=8 * MAX_MESSAGE,
         ws_ping_interval=_PING_S,
         ws_ping_timeout=_PING_S,
@@ -170,7 +208,7 @@ def _config(console: Console, token: str | None, pair: tuple[Path, Path] | None)
 def _listening(host: str, port: int) -> Iterator[socket.socket]:
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-        listener = socket.create_server((host, port), family=family, backlog=64)
+        listener = socket.create_server((host, port), family=family, backlog=_BACKLOG)
     except OSError as error:
         raise DeviceError(f"console: cannot listen on {host}:{port}: {error}; choose another --port") from error
     with listener:

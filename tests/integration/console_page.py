@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Any, Self
 
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
 OPEN_S = 20.0
@@ -93,16 +93,24 @@ class Page:
 
 @contextlib.contextmanager
 def open_page(port: int, limit_s: float = OPEN_S) -> Iterator[Page]:
-    """Opens a page as soon as the console answers, and closes it for sure."""
+    """Opens a page as soon as the console lets it in, trying again as a browser does; closes it for sure."""
     deadline = time.monotonic() + limit_s
-    with contextlib.ExitStack() as stack:
-        while True:
-            try:
-                connection = stack.enter_context(connect(f"ws://127.0.0.1:{port}/ws", compression=None))
-                break
-            except OSError:
-                assert time.monotonic() < deadline, f"no console on port {port} within {limit_s} s"
-                time.sleep(0.05)
-        page = stack.enter_context(Page(connection))
-        page.until(lambda: "snapshot" in page.newest, limit_s)
-        yield page
+    while True:
+        with contextlib.ExitStack() as stack:
+            page = _try_page(port, stack)
+            if page is not None:
+                yield page
+                return
+        assert time.monotonic() < deadline, f"the console on port {port} lets nobody in within {limit_s} s"
+        time.sleep(0.05)
+
+
+def _try_page(port: int, stack: contextlib.ExitStack) -> Page | None:
+    """Opens a page that lives as long as the stack; None if it is not let in, or told to go again."""
+    try:
+        connection = stack.enter_context(connect(f"ws://127.0.0.1:{port}/ws", compression=None))
+    except (OSError, WebSocketException, EOFError):
+        return None
+    page = stack.enter_context(Page(connection))
+    page.until(lambda: "snapshot" in page.newest or page.closed, OPEN_S)
+    return None if page.closed else page

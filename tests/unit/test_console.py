@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from collections import Counter
 from typing import Any
 
 import pytest
@@ -294,15 +295,21 @@ def test_a_page_that_steers_and_is_not_heard_is_told() -> None:
     assert newest(link)["notices"]["notices"] == []
 
 
-def test_a_page_that_stops_reading_is_let_go() -> None:
-    link = PageLink(1)
-    for _ in range(MOST_EVENTS + 1):
-        link.tell("x")
+def test_what_others_do_fills_no_page_and_closes_none() -> None:
+    stage = Stage()
+    slow, toggling = stage.console.open(), stage.console.open()
+    read(slow)
+    for k in range(10 * MOST_EVENTS):
+        say(stage, toggling, type="take" if k % 2 else "release")
+    stage.step(drone_1=stage.drone())
+    said = Counter(message["type"] for message in read(slow))
+    assert said == {"control": 1, "health": 1, "snapshot": 1}
 
-    async def forever(_: str) -> None:
-        await asyncio.sleep(0)
-
-    asyncio.run(asyncio.wait_for(link.run(forever), 5.0))
+    for k in range(3 * MOST_EVENTS):
+        event = PatternEvent(**stage.envelope(), pattern=f"{k}", outcome="finished", state_seq=0)
+        stage.step(pattern=event)
+    patterns = [message["name"] for message in read(slow) if message["type"] == "pattern"]
+    assert patterns == [str(k) for k in range(2 * MOST_EVENTS, 3 * MOST_EVENTS)]
 
 
 @pytest.mark.parametrize("name", ["slalom", "maze", "grid"])

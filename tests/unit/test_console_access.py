@@ -3,9 +3,12 @@
 import datetime
 import ssl
 import stat
+import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import pytest
 from cryptography import x509
@@ -13,9 +16,10 @@ from starlette.exceptions import StarletteDeprecationWarning
 from starlette.websockets import WebSocketDisconnect
 
 from observer.console.access import is_loopback, is_own_host, is_same_site, is_token
-from observer.console.app import MOST_PAGES, make_app
+from observer.console.app import make_app
 from observer.console.arguments import RANDOM_TOKEN, TOKEN_VARIABLE
 from observer.console.console import Console
+from observer.console.crowd import KEPT, PAGES_OF_ONE, Guest
 from observer.console.scene import HandMap
 from observer.console.serve import find_token
 from observer.console.swarm_view import SwarmView
@@ -142,17 +146,53 @@ def test_the_printed_address_lets_in_once_and_for_all(guarded: TestClient) -> No
         assert page.receive_json()["type"] == "scene"
 
 
-def test_too_many_pages_are_turned_away() -> None:
+def closing_reason(client: TestClient) -> str:
+    """Opens a page that is closed again, and returns why."""
+    with client.websocket_connect(WS) as page:
+        while (message := page.receive())["type"] != "websocket.close":
+            pass
+    return str(message["reason"])
+
+
+def test_when_all_places_are_taken_only_who_steers_finds_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("observer.console.app.KEPT_S", 1.5)
+    monkeypatch.setattr("observer.console.app.LOOK_S", 0.05)
     served = console()
-    for _ in range(MOST_PAGES):
-        served.open()
-    with (
-        TestClient(make_app(served, None), base_url=HERE) as client,
-        client.websocket_connect(WS) as page,
-        pytest.raises(WebSocketDisconnect) as refused,
-    ):
-        page.receive_json()
-    assert "too many" in refused.value.reason
+    with TestClient(make_app(served, None), base_url=HERE) as client, ExitStack() as pages:
+        watching = [pages.enter_context(client.websocket_connect(WS)) for _ in range(PAGES_OF_ONE)]
+        assert "only one that steers" in closing_reason(client)
+        steering = pages.enter_context(client.websocket_connect(WS))
+        steering.send_json({"type": "take"})
+        other = pages.enter_context(client.websocket_connect(WS))
+        other.send_json({"type": "take"})
+        assert "only one that steers" in closing_reason(client), "both kept places are taken"
+        until(lambda: served.pages == PAGES_OF_ONE + KEPT)
+        time.sleep(2.0)
+        assert served.pages == PAGES_OF_ONE + KEPT, "one holds the hand, the other asks for it"
+        other.send_json({"type": "release"})
+        until(lambda: served.pages == PAGES_OF_ONE + 1)
+        watching[0].close()
+        until(lambda: served.pages == PAGES_OF_ONE)
+        with client.websocket_connect(WS) as page:
+            assert page.receive_json()["type"] == "scene"
+
+
+def until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_another_user_of_this_machine_is_told_how_to_come_in() -> None:
+    stranger = Guest("user 1001", 0.0, is_stranger=True)
+    with TestClient(make_app(console(), None, lambda _: stranger), base_url=HERE) as client:
+        answer = client.get("/")
+        assert answer.status_code == 403
+        assert "another" not in answer.text
+        assert "--token random" in answer.text
+        with pytest.raises(WebSocketDisconnect), client.websocket_connect(WS):
+            pass
 
 
 def test_a_page_speaks_and_closing_it_is_noticed() -> None:
@@ -161,9 +201,10 @@ def test_a_page_speaks_and_closing_it_is_noticed() -> None:
         with client.websocket_connect(WS) as page:
             page.send_bytes(b"\xff")
             page.send_json({"type": "take"})
-            told = [page.receive_json() for _ in range(7)]
-            assert "refused" in {message["type"] for message in told}
-            assert told[-1]["holder"] == 1
+            told: dict[str, Any] = {}
+            while told.get("control", {}).get("holder") != 1 or "refused" not in told:
+                message = page.receive_json()
+                told[message["type"]] = message
         assert served.pages == 0
 
 

@@ -20,7 +20,7 @@ from glove_bridge.patterns import load_patterns
 from observer.glove_log import GloveLog
 from shared.config import load_scenario
 from shared.formation import build_formation
-from shared.messages import Heard, PatternEvent
+from shared.messages import Heard, PatternEvent, ProcessStatus
 
 MS = 1_000_000
 START = 5_000 * MS
@@ -161,3 +161,33 @@ def test_the_summary_table_lists_patterns() -> None:
     assert ["CR", "3", "3", "0", "0", "0"] in rows
     assert ["EL", "0", "0", "0", "2", "1"] in rows
     assert ["CL", "0", "0", "1", "0", "0"] in rows
+
+
+def bridge_status(glove_there: float) -> ProcessStatus:
+    return ProcessStatus(
+        epoch=1,
+        seq=0,
+        stamp_ns=0,
+        role="bridge",
+        id=0,
+        pid=1,
+        host="h",
+        state="running",
+        metrics={"glove_there": glove_there},
+    )
+
+
+def test_what_the_glove_cannot_make_felt_is_told_once() -> None:
+    panel, log = GlovePanel("flight"), GloveLog()
+    assert panel.unfelt(log.failed, None) == []
+    log.add(event("ER", "failed"))
+    assert panel.unfelt(log.failed, bridge_status(1.0)) == [], "the state of the formation is no alarm"
+    log.add(event("DRONE_LOST", "failed"))
+    assert panel.unfelt(log.failed, bridge_status(0.0)) == [
+        "the glove cannot be felt: see bridge.log",
+        "NOT FELT: drone lost",
+    ]
+    assert panel.unfelt(log.failed, bridge_status(0.0)) == []
+    log.add(event("DRONE_LOST", "failed"))
+    log.add(event("FENCE", "started", START))
+    assert panel.unfelt(log.failed, bridge_status(1.0)) == ["the glove can be felt", "NOT FELT: drone lost"]

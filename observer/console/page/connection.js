@@ -3,7 +3,7 @@
 const FIRST_RETRY_MS = 250;
 const LAST_RETRY_MS = 3000;
 
-/** @typedef {{message: (message: any) => void, state: (open: boolean) => void, refused: () => void}} Ear */
+/** @typedef {{message: (message: any) => void, state: (open: boolean, why: string) => void, refused: () => void}} Ear */
 
 /** One connection at a time; whatever is sent while there is none is lost, as it would be stale. */
 export class Connection {
@@ -30,11 +30,13 @@ export class Connection {
     this.#socket = socket;
     socket.onopen = () => {
       opened = true;
-      this.#retry_ms = FIRST_RETRY_MS;
-      this.#ear.state(true);
+      this.#ear.state(true, "");
     };
-    socket.onmessage = (event) => this.#ear.message(JSON.parse(event.data));
-    socket.onclose = () => this.#lost(opened);
+    socket.onmessage = (event) => {
+      this.#retry_ms = FIRST_RETRY_MS; // whoever is turned away at once need not hurry back
+      this.#ear.message(JSON.parse(event.data));
+    };
+    socket.onclose = ({ reason }) => this.#lost(opened, reason);
   }
 
   /** @param {object} message */
@@ -50,9 +52,9 @@ export class Connection {
     return fetch("./").then(({ status }) => status === 403, () => false);
   }
 
-  /** @param {boolean} opened whether it had ever been open */
-  async #lost(opened) {
-    this.#ear.state(false);
+  /** @param {boolean} opened whether it had ever been open @param {string} reason what the console says of it */
+  async #lost(opened, reason) {
+    this.#ear.state(false, reason);
     if (!opened && (await this.#refused())) {
       this.#ear.refused();
       return;

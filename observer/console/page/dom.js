@@ -39,3 +39,18 @@ export function make(name, text, tone = "") {
   }
   return element;
 }
+
+/**
+ * Acts when a button is pressed, also by a second finger while the first one steers: browsers make no click of that.
+ * @param {HTMLElement} button
+ * @param {() => void} act
+ */
+export function onPress(button, act) {
+  button.addEventListener("click", act);
+  button.addEventListener("pointerup", (event) => {
+    const under = document.elementFromPoint(event.clientX, event.clientY);
+    if (!event.isPrimary && event.pointerType === "touch" && button.contains(under) && !button.matches(":disabled")) {
+      act();
+    }
+  });
+}

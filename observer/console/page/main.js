@@ -80,12 +80,12 @@ function controlChanged(message) {
   control.show(connection.open);
 }
 
-/** Whoever loses the connection has lost the hand too. @param {boolean} open */
-function connectionChanged(open) {
+/** Whoever loses the connection has lost the hand too. @param {boolean} open @param {string} why if it is not */
+function connectionChanged(open, why) {
   if (!open) {
     controlChanged({ holder: null, asking: [], wish: model.wish });
   }
-  control.show(open);
+  control.show(open, why);
 }
 
 /** Whoever has just lost the hand need not hear that its last move came too late. @param {string} why */
@@ -146,6 +146,7 @@ function draw(now) {
 new Drag(part("surface"), {
   camera: () => views.camera,
   hand: () => model.hand,
+  wanted: () => steering.point ?? model.hand,
   take: () => control.reach(),
   goTo: (x, y) => steering.goTo(x, y),
   lift: (metres) => steering.lift(metres),

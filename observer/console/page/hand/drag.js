@@ -1,4 +1,8 @@
-/** Mouse, pen or touch on the view from above: one drags the hand, a second finger or the wheel lifts it. */
+/** Mouse, pen or touch on the view from above: one drags the hand, two fingers or the wheel lift it.
+ *
+ * However many fingers there are, there is one hand: a second finger stops it where it is, and whichever finger stays
+ * last drags it on from there. It never jumps to a finger that was already down.
+ */
 
 const LIFT_PER_PX = 0.005;
 const LIFT_PER_NOTCH = 0.06;
@@ -7,6 +11,7 @@ const GRAB_PX = 36;
 /** @typedef {object} Reach what a drag may do
  * @property {() => import("../view/camera.js").TopCamera | null} camera
  * @property {() => readonly number[]} hand where the hand is now
+ * @property {() => readonly number[]} wanted where it is called to
  * @property {() => boolean} take called when a drag begins; whether it may have the hand
  * @property {(x: number, y: number) => void} goTo
  * @property {(metres: number) => void} lift
@@ -16,7 +21,7 @@ const GRAB_PX = 36;
 export class Drag {
   /** @type {Map<number, {x: number, y: number}>} */
   #pointers = new Map();
-  /** From the pointer to the hand that it has grabbed, px. */
+  /** From the pointer to the hand that it holds, px. */
   #offset = { x: 0, y: 0 };
   #surface;
   #reach;
@@ -28,7 +33,7 @@ export class Drag {
     surface.addEventListener("pointerdown", (event) => this.#press(event));
     surface.addEventListener("pointermove", (event) => this.#move(event));
     for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) {
-      surface.addEventListener(end, (event) => this.#pointers.delete(event.pointerId));
+      surface.addEventListener(end, (event) => this.#lift(event));
     }
     surface.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
   }
@@ -40,18 +45,32 @@ export class Drag {
     }
     this.#surface.setPointerCapture(event.pointerId);
     this.#pointers.set(event.pointerId, place(event));
-    if (this.#pointers.size === 1 && this.#reach.take()) {
-      this.#grab(place(event));
+    if (!this.#reach.take()) {
+      return;
+    }
+    if (this.#pointers.size === 1) {
+      const offset = this.#toHand(place(event), this.#reach.hand());
+      this.#offset = Math.hypot(offset.x, offset.y) < GRAB_PX ? offset : { x: 0, y: 0 };
       this.#follow(place(event));
+    } else if (this.#pointers.size === 2) {
+      const [x, y] = this.#reach.hand();
+      this.#reach.goTo(x, y);
     }
   }
 
-  /** A press near the hand grabs it where it is; elsewhere it calls the hand there.
-   * @param {{x: number, y: number}} pointer */
-  #grab(pointer) {
-    const [x, y] = this.#reach.camera()?.toScreen(this.#reach.hand()) ?? [pointer.x, pointer.y];
-    const offset = { x: x - pointer.x, y: y - pointer.y };
-    this.#offset = Math.hypot(offset.x, offset.y) < GRAB_PX ? offset : { x: 0, y: 0 };
+  /** The finger that is left holds the hand by where it is. @param {PointerEvent} event */
+  #lift(event) {
+    this.#pointers.delete(event.pointerId);
+    const [left] = this.#pointers.values();
+    if (left !== undefined) {
+      this.#offset = this.#toHand(left, this.#reach.wanted());
+    }
+  }
+
+  /** @param {{x: number, y: number}} pointer @param {readonly number[]} point @returns {{x: number, y: number}} px */
+  #toHand(pointer, point) {
+    const [x, y] = this.#reach.camera()?.toScreen(point) ?? [pointer.x, pointer.y];
+    return { x: x - pointer.x, y: y - pointer.y };
   }
 
   /** @param {PointerEvent} event */
@@ -64,7 +83,6 @@ export class Drag {
     this.#pointers.set(event.pointerId, now);
     if (this.#pointers.size > 1) {
       this.#reach.lift(((before.y - now.y) * LIFT_PER_PX) / this.#pointers.size);
-      this.#grab(now);
     } else {
       this.#follow(now);
     }

@@ -1,7 +1,7 @@
 /** Who holds the hand, and what may be ordered. */
 
 import { flies, STALE_S } from "../model.js";
-import { part, write } from "../dom.js";
+import { onPress, part, write } from "../dom.js";
 
 /** @typedef {import("../model.js").Model} Model */
 
@@ -23,11 +23,11 @@ export class ControlPanel {
   constructor(model, send) {
     this.#model = model;
     this.#send = send;
-    part("take").addEventListener("click", () => send({ type: this.#releases ? "release" : "take" }));
-    part("give").addEventListener("click", () => send({ type: "give", to: model.asking[0] }));
-    part("keep").addEventListener("click", () => this.#keep());
+    onPress(part("take"), () => send({ type: this.#releases ? "release" : "take" }));
+    onPress(part("give"), () => send({ type: "give", to: model.asking[0] }));
+    onPress(part("keep"), () => this.#keep());
     for (const button of orderButtons()) {
-      button.addEventListener("click", () => this.order(button.dataset.order ?? ""));
+      onPress(button, () => this.order(button.dataset.order ?? ""));
     }
   }
 
@@ -59,12 +59,14 @@ export class ControlPanel {
     return mine || (scene !== null && asking.includes(scene.you));
   }
 
-  /** Shows who holds the hand. @param {boolean} open whether there is a connection */
-  show(open) {
+  /** Shows who holds the hand.
+   * @param {boolean} open whether there is a connection
+   * @param {string} [why] there is none, if the console has said so */
+  show(open, why = "") {
     const { mine, asking, holder, scene } = this.#model;
     const steers = open && (scene?.can_steer ?? false);
-    part("hand").dataset.mine = String(mine);
-    write(part("hand-state"), this.#holder(open));
+    part("hand").dataset.mine = document.body.dataset.holding = String(mine);
+    write(part("hand-state"), this.#holder(open) || why);
     write(part("take"), this.#takeText());
     button("take").disabled = !steers;
     part("take").classList.toggle("primary", !mine);

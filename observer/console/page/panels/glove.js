@@ -27,7 +27,14 @@ const MEANINGS = {
   LOW_BATTERY: "a battery is low",
 };
 
-/** @typedef {{name: string, outcome: string, frames: import("../glove/tones.js").Frame[], elapsed: number}} Event */
+/**
+ * @typedef {object} Event
+ * @property {string} name
+ * @property {string} outcome
+ * @property {boolean} cue
+ * @property {import("../glove/tones.js").Frame[]} frames
+ * @property {number} elapsed
+ */
 
 /** Everything under the heading "Glove". */
 export class GlovePanel {
@@ -37,6 +44,8 @@ export class GlovePanel {
   /** @type {import("../glove/tones.js").Frame | null} */
   #felt = null;
   #rumbles = false;
+  /** Whether what is shown could not be felt. */
+  #unfelt = false;
 
   constructor() {
     toggle(part("sound"), () => {
@@ -46,11 +55,14 @@ export class GlovePanel {
     toggle(part("rumble"), () => (this.#rumbles = !this.#rumbles));
   }
 
-  /** Plays what the glove has begun. @param {Event} event @param {number} now ms */
-  hear({ name, outcome, frames, elapsed }, now) {
-    if (outcome !== "started") {
+  /** Plays what the glove has begun, and a safety cue also if it could not: somebody has to feel, see or hear it.
+   * @param {Event} event @param {number} now ms */
+  hear({ name, outcome, cue, frames, elapsed }, now) {
+    const unfelt = cue && outcome === "failed";
+    if (outcome !== "started" && !unfelt) {
       return;
     }
+    this.#unfelt = unfelt;
     this.#player.play(name, frames, now - 1000 * elapsed);
     this.#speaker.play(frames, elapsed);
     if (this.#rumbles) {
@@ -64,7 +76,7 @@ export class GlovePanel {
     this.#figure.show(frame);
     const name = frame ? this.#player.name : "";
     write(part("pattern-name"), name || "at rest");
-    write(part("pattern-meaning"), MEANINGS[name] ?? "");
+    write(part("pattern-meaning"), `${MEANINGS[name] ?? ""}${name && this.#unfelt ? ", not felt: no glove" : ""}`);
     if (frame !== this.#felt && frame !== null && this.#rumbles) {
       rumble(frame);
     }
