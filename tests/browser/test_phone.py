@@ -1,4 +1,4 @@
-"""On a phone: whoever holds the hand sees what it steers, and however many fingers there are, there is one hand."""
+"""On a phone: whoever holds the hand sees what it steers; however many fingers there are, there is one hand."""
 
 from typing import Any
 
