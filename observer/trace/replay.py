@@ -12,6 +12,7 @@ from shared.errors import DecodeError
 from shared.topics import Delivery, topic_of
 from shared.transport import Bus, Publish
 
+_LONGEST_WAIT_S = 3600.0
 PREFIX = "replay/"
 """Before every key, unless the replay is to be taken for a live swarm."""
 
@@ -50,8 +51,9 @@ def replay(
     for record in records:
         first_ns = first_ns or record.log_ns
         due_ns = start_ns + round((record.log_ns - first_ns) / speed)
-        if (early_ns := due_ns - clock()) > 0:
-            stopping.wait(early_ns / NS_PER_S)
+        while (early_ns := due_ns - clock()) > 0 and not stopping.is_set():
+            # No wait is as long as two times in a file can be apart.
+            stopping.wait(min(early_ns / NS_PER_S, _LONGEST_WAIT_S))
         if stopping.is_set():
             break
         try:

@@ -73,12 +73,14 @@ class Parser:
         parse: Parses; raises nothing but `SwarmTouchError`.
         seeds: Makes good inputs.
         is_wire: Whether it takes bytes from a wire or a binary file: those are fuzzed with coverage, too.
+        is_file: Whether it reads a file: those are tried in all sizes, too.
     """
 
     name: str
     parse: Callable[[bytes], object]
     seeds: Callable[[], Iterable[bytes]]
     is_wire: bool = False
+    is_file: bool = False
 
     def inputs(self) -> list[bytes]:
         """Returns the good inputs and what is kept in the corpus."""
@@ -280,6 +282,7 @@ def _certificate(path: Path) -> object:
 
 
 _Wire = partial(Parser, is_wire=True)
+_File = partial(Parser, is_file=True)
 
 PARSERS = (
     _Wire(name="message", parse=_message, seeds=seeds.messages),
@@ -303,8 +306,9 @@ PARSERS = (
     ),
     _Wire(name="text", parse=_text, seeds=lambda: [b"drone 2", "Müller".encode(), b"[/red] \x1b[31m"]),
     _Wire(name="zenoh-log", parse=_zenoh_log, seeds=lambda: [seeds.ZENOH_LOG]),
-    _Wire(name="trace", parse=_in_file("trace.mcap", _trace), seeds=seeds.traces),
-    Parser(
+    _File(name="trace", parse=_in_file("trace.mcap", _trace), seeds=seeds.traces, is_wire=True),
+    _File(name="bag", parse=_in_file("hand.bag", _hand), seeds=seeds.bags, is_wire=True),
+    _File(
         name="scenario",
         parse=_in_file("scenario.toml", _scenario),
         seeds=lambda: seeds.files(*sorted(SCENARIOS.glob("*.toml"))),
@@ -332,62 +336,61 @@ PARSERS = (
         parse=_headers,
         seeds=lambda: [b"localhost:8080", b"http://localhost:8080", b"[::1]:80", b"secret"],
     ),
-    Parser(
+    _File(
         name="calibration",
         parse=_in_file("calibration.toml", load_calibration),
         seeds=lambda: seeds.files(SHIPPED),
     ),
-    Parser(
+    _File(
         name="patterns",
         parse=_in_file("patterns.toml", load_patterns),
         seeds=lambda: seeds.files(*sorted(FOLDER.glob("*.toml"))),
     ),
-    Parser(
+    _File(
         name="page-patterns",
         parse=_in_file("patterns.json", read_page_patterns),
         seeds=lambda: [json.dumps(seeds.PAGE_PATTERNS).encode()],
     ),
-    Parser(
+    _File(
         name="members",
         parse=_in_file("members/members.toml", lambda path: Keyring(path.parent).members()),
         seeds=lambda: seeds.files(seeds.keys().folder / "members.toml"),
     ),
-    Parser(
+    _File(
         name="hand-public-key",
         parse=_in_file("hand.pub", verify_with),
         seeds=lambda: seeds.files(seeds.keys().hand_public),
     ),
-    Parser(
+    _File(
         name="hand-private-key",
         parse=_in_file("hand.key", sign_with),
         seeds=lambda: seeds.files(seeds.keys().hand_private),
     ),
-    Parser(
+    _File(
         name="certificate",
         parse=_in_file("issued/relay.crt", _certificate),
         seeds=lambda: seeds.files(seeds.keys().authority, seeds.keys().certificate("relay")),
     ),
-    Parser(name="flight-track", parse=_in_file("glove.csv", read_track), seeds=lambda: [seeds.TRACK]),
-    Parser(name="flight-track-packed", parse=_in_file("glove.csv.gz", read_track), seeds=seeds.tracks),
-    Parser(
+    _File(name="flight-track", parse=_in_file("glove.csv", read_track), seeds=lambda: [seeds.TRACK]),
+    _File(name="flight-track-packed", parse=_in_file("glove.csv.gz", read_track), seeds=seeds.tracks),
+    _File(
         name="flight-patterns",
         parse=_in_file("pattern_topic.csv.gz", lambda path: read_patterns(path.parent)),
         seeds=lambda: [gzip.compress(b"t_bag_ns,name\n1,\n2,extended_left\n", mtime=0)],
     ),
-    Parser(
+    _File(
         name="flight-obstacles",
         parse=_in_file("obstacles.csv", lambda path: read_obstacles(path.parent)),
         seeds=lambda: [b"name,median_x,median_y\na,1.0,2.0\nb,-1,0\n"],
     ),
-    Parser(
+    _File(
         name="flight-meta",
         parse=_in_file("meta.json", lambda path: read_meta(path.parent)),
         seeds=lambda: [json.dumps(seeds.META).encode()],
     ),
-    Parser(
+    _File(
         name="hand-csv",
         parse=_in_file("hand.csv", _hand),
-        seeds=lambda: [b"t,x,y,z,yaw\n0,0,0,1,0\n0.1,0,0,1,0.1\n", b"t,x,y,z\n0,0,0,1\n1,0,0,1\n"],
+        seeds=seeds.hand_tables,
     ),
-    Parser(name="bag", parse=_in_file("hand.bag", _hand), seeds=seeds.bags),
 )

@@ -158,6 +158,13 @@ def tracks() -> list[bytes]:
     return [gzip.compress(TRACK, mtime=0)]
 
 
+def hand_tables() -> list[bytes]:
+    """Makes tables of hands: with and without a heading, in the encodings of editors, packed."""
+    text = "t,x,y,z\n" + "".join(f"{k / 60:.4f},0,0,1\n" for k in range(9))
+    turned = b"t,x,y,z,yaw\n0,0,0,1,0\n0.1,0,0,1,0.1\n"
+    return [turned, *(text.encode(name) for name in ("utf-8-sig", "utf-16")), gzip.compress(turned, mtime=0)]
+
+
 def bags() -> list[bytes]:
     """Makes a ROS 1 bag of every type with poses, and one that is cut off."""
     with tempfile.TemporaryDirectory() as folder:

@@ -1,5 +1,6 @@
 """Every parser of the table: its good inputs are good, and no bytes get more out of it than a refusal."""
 
+import gzip
 import re
 
 import pytest
@@ -43,6 +44,8 @@ NASTY = (
 """What parsers stumble over."""
 
 
+MOST = 50_000
+"""Bytes by which a file may grow here; the bounds themselves are tested with their readers."""
 _WORD = re.compile(rb"[\w.+-]+|\W")
 
 
@@ -66,6 +69,20 @@ def with_other_words(draw: st.DrawFn, good: list[bytes]) -> bytes:
     return b"".join(words)
 
 
+@st.composite
+def of_another_size(draw: st.DrawFn, good: list[bytes]) -> bytes:
+    """Makes a good input that was cut off, goes on and on, or is packed, and then cut off."""
+    data = draw(st.sampled_from(good))
+    at = draw(st.integers(0, len(data)))
+    more = draw(st.sampled_from((data[at:], b"\0", b"\n", b"9", b",", b"x = 1\n", b"[", b"\xff")))
+    times = draw(st.integers(0, MOST // max(1, len(more))))
+    data = draw(st.sampled_from((data[:at], data + more * times, data[:at] + more * times)))
+    if draw(st.booleans()):
+        data = gzip.compress(data, mtime=0)
+        data = data[: draw(st.integers(0, len(data)))]
+    return data
+
+
 @pytest.mark.parametrize("parser", PARSERS, ids=lambda parser: parser.name)
 def test_good_inputs_are_good_and_the_corpus_holds(parser: Parser) -> None:
     assert all(parser.accepts(data) for data in parser.seeds())
@@ -81,6 +98,18 @@ def test_whatever_comes_in_is_a_value_or_a_refusal(parser: Parser) -> None:
 
     @settings(max_examples=500 if parser.is_wire else 200)
     @given(data=with_other_words(good) | with_other_bytes(good) | anything)
+    def check(data: bytes) -> None:
+        parser.accepts(data)
+
+    check()
+
+
+@pytest.mark.parametrize("parser", [p for p in PARSERS if p.is_file], ids=lambda parser: parser.name)
+def test_a_file_of_whatever_size_is_a_value_or_a_refusal(parser: Parser) -> None:
+    good = parser.inputs()
+
+    @settings(max_examples=60)
+    @given(data=of_another_size(good))
     def check(data: bytes) -> None:
         parser.accepts(data)
 

@@ -8,10 +8,11 @@ import pytest
 
 from observer.trace.read import open_trace
 from observer.trace.replay import PREFIX, Replayed, replay
+from observer.trace.write import TraceWriter
 from shared.memory_bus import MemoryBus, MemoryNetwork
 from shared.topics import TOPICS
 from shared.transport import Arrival, Inbox
-from tests.traces import STEP_NS, flight, write
+from tests.traces import SCENARIO, STEP_NS, flight, write
 
 PAYLOADS = flight(300)
 
@@ -28,6 +29,7 @@ class Patience(threading.Event):
 
     def wait(self, timeout: float | None = None) -> bool:
         assert timeout is not None
+        assert timeout < threading.TIMEOUT_MAX
         self.now_ns += round(timeout * 1e9) + self._overshoot_ns
         if self.now_ns > self._end_ns:
             self.set()
@@ -65,6 +67,15 @@ def test_a_late_message_does_not_make_the_next_ones_late(tmp_path: Path) -> None
     last = max(arrival.arrival_ns for arrivals in heard.values() for arrival in arrivals)
     assert last <= (len(PAYLOADS) - 1) * STEP_NS + STEP_NS // 2
     assert done.lateness_ms.p50 == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_silence_of_centuries_can_be_waited_for(tmp_path: Path) -> None:
+    writer = TraceWriter(tmp_path, SCENARIO)
+    for log_ns in (0, 2**64 - 1):
+        writer.add(*PAYLOADS[0][:1], Arrival(PAYLOADS[0][1], log_ns))
+    writer.close(0)
+    done, _ = listen(tmp_path, Patience(end_ns=10**13), PREFIX)
+    assert done.messages == 1
 
 
 def test_it_ends_when_told_to(tmp_path: Path) -> None:
