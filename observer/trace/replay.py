@@ -47,9 +47,10 @@ def replay(
     """
     publishers: dict[str, Publish] = {}
     lateness, messages, left_out = Histogram(), 0, 0
-    start_ns, first_ns = clock(), 0
+    start_ns: int = clock()
+    first_ns: int | None = None
     for record in records:
-        first_ns = first_ns or record.log_ns
+        first_ns = record.log_ns if first_ns is None else first_ns
         due_ns = start_ns + round((record.log_ns - first_ns) / speed)
         while (early_ns := due_ns - clock()) > 0 and not stopping.is_set():
             # No wait is as long as two times in a file can be apart.
