@@ -51,7 +51,7 @@ class Peers:
         Returns:
             None if there is no telling: another machine, a program that is gone, or a system that does not say.
         """
-        if self._socket is None:
+        if self._socket is None or connection.family not in (socket.AF_INET, socket.AF_INET6):
             return None
         try:
             near, far = connection.getsockname()[:2], connection.getpeername()[:2]

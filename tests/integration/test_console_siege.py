@@ -49,11 +49,11 @@ def test_the_operator_comes_in_flies_and_stops(user: int | None, tmp_path: Path)
             if user is None:
                 with open_page(port) as first, open_page(port) as watching:
                     take_off(first, recorder)
-                    besieged.enter_context(siege(port, "half-open", HALF_OPEN))
-                    besieged.enter_context(siege(port, "idle-page", IDLE_PAGES))
                     with siege(port, "toggling-page", 1):
                         changes = watching.counts["control"]
                         watching.until(lambda: watching.counts["control"] > changes + 20, START_S)
+                    besieged.enter_context(siege(port, "half-open", HALF_OPEN))
+                    besieged.enter_context(siege(port, "idle-page", IDLE_PAGES))
                     assert not watching.closed, "whatever another page does"
                     assert first.newest["control"]["holder"] == first.newest["scene"]["you"]
                     recorder.until(lambda: recorder.all_in(Mode.FOLLOW), START_S)
