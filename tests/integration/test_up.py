@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from deploy.launcher.supervisor import AT_ONCE
 from shared.config import load_scenario
 from shared.process import LAUNCHER_PID
 
@@ -129,6 +130,19 @@ def test_a_flight_ends_with_its_hand(tmp_path: Path) -> None:
         output, errors = process.communicate(timeout=100)
         assert process.returncode == 0, errors
     assert json.loads(output.splitlines()[-1])["ok"] is True
+
+
+def test_more_than_start_at_a_time_are_all_in_formation_without_a_restart(tmp_path: Path) -> None:
+    drones = AT_ONCE + 2
+    arguments = ("grid", "--set", f"formation.n={drones}", "--set", "limits.takeoff_height=0.6", "--json")
+    with launched(tmp_path, *arguments) as process:
+        logs = [tmp_path / "latest" / "logs" / f"drone-{n}.log" for n in range(1, drones + 1)]
+        until(lambda: all(log.exists() and "FOLLOW at" in log.read_text() for log in logs), 3 * STARTUP_S)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=60)
+    summary = json.loads(output.splitlines()[-1])
+    assert (summary["restarts"], summary["landed"]) == (0, True), errors
+    assert all(agent["followed"] for agent in summary["agents"])
 
 
 def test_a_hand_that_is_nowhere_makes_no_flight(tmp_path: Path) -> None:
