@@ -229,7 +229,7 @@ def test_garbage_on_every_key_is_counted_and_the_flight_goes_on(tmp_path: Path) 
     check_flew_on(recorder, start_ns, end_ns)
     assert summary["ok"] is True
     assert (summary["restarts"], summary["collisions"], summary["fence_exits"]) == (0, 0, 0)
-    assert recorder.statuses[RELAY].rejected == {"impossible-pose": 0}
+    assert not any(recorder.statuses[RELAY].rejected.values())
     assert sum(recorder.statuses[WORLD].rejected.values()) > len(REASONS)
     said = flight.logs() + (tmp_path / "launcher.log").read_text()
     assert "Traceback" not in said

@@ -73,8 +73,7 @@ ENDING = """
 import signal, sys
 from shared.process import prepare_process
 
-if "nohup" in sys.argv:
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+signal.signal(signal.SIGHUP, signal.SIG_IGN if "nohup" in sys.argv else signal.SIG_DFL)
 stopping = prepare_process("x")
 signal.raise_signal(signal.Signals[sys.argv[1]])
 print(stopping.is_set())

@@ -147,7 +147,9 @@ def test_a_damaged_byte_costs_at_most_a_chunk(tmp_path: Path, layout: str, ends:
         if has_checksums:
             assert found <= sent
         missing = sent.total() - found.total()  # without checksums, who said what may be changed
-        assert missing <= 8, (place, flip, trace.faults)
+        # ... and so may be the one word that says how a whole channel is encoded.
+        misnamed = not has_checksums and any(fault.endswith("not msgpack") for fault in trace.faults)
+        assert missing <= 8 or misnamed, (place, flip, trace.faults)
         assert trace.faults or missing <= 0
 
     check()
