@@ -87,7 +87,7 @@ def test_who_disturbs_the_radio_is_counted_by_reason_and_changes_nothing(
 ) -> None:
     start_ns = swarm.recorder.clock()
     hand = swarm.recorder.hands[max(swarm.recorder.hands)]
-    newer = replace(hand, epoch=hand.epoch + 1, position=(9.0, 9.0, 9.0), signature=blank())
+    newer = replace(hand, seq=hand.seq + 250, position=(9.0, 9.0, 9.0), signature=blank())
     another = sign_with(other_hand(swarm))(encode(newer))
     say_hand, say_state = foreign.publisher(HAND), foreign.publisher(DRONE_STATE, id=2)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as garbage:
