@@ -3,18 +3,25 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from agents.company import Company, Memory, look_around
-from agents.control.avoidance import Encounter
 from agents.control.hand import HandInput
-from agents.control.modes import HAND_STALE
+from agents.control.modes import HAND_STALE, is_airborne
 from agents.control.repair import REFERENCE_LOST, Reference
-from agents.control.steering import Bystander
+from agents.control.safety.encounter import (
+    SILENT_AFTER,
+    Clearance,
+    Encounter,
+    drone_heard,
+    drone_silent,
+    walker_seen,
+)
 from agents.control.step import Inputs, Settings, State, start, step
+from agents.settings import clearances
 from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
 from shared.fence import bodies_of
 from shared.formation import Formation
-from shared.messages import NO_HAND, DroneState, Flag, HandSample, Heard
+from shared.messages import NO_HAND, ORIGIN, DroneState, Flag, HandSample, Heard
 from shared.net.keyring import hand_verifier
 from shared.nodes import neighbours
 from shared.scenario import Scenario
@@ -26,14 +33,9 @@ from shared.vehicles import vehicle_settings
 NEVER = float("inf")
 HAND_KEY = HAND.key()
 
-SILENT_AFTER = 0.1
-"""A drone unheard for this long is kept away from more and more, s ..."""
-SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
-"""... from this distance on, growing at this rate, up to this, m and m/s."""
 DOUBTED_FOR = 1.0
 """That somebody says what cannot be believed is told for this long, s."""
 _DOUBTED_NS = round(DOUBTED_FOR * NS_PER_S)
-_SILENT_NS = round(SILENT_AFTER * NS_PER_S)
 
 
 class Agent:
@@ -51,13 +53,17 @@ class Agent:
         self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
     ) -> None:
         self.senses = Senses(
-            neighbours(scenario, formation, drone), hand_verifier(scenario.net), bodies_of(scenario, formation)
+            neighbours(scenario, formation, drone),
+            hand_verifier(scenario.net),
+            bodies_of(scenario, formation),
+            obstacles=True,
         )
         self.steps = 0
         self._drone = drone
         self._epoch = epoch
         self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
         self._kin = {kin.drone: DRONE_STATE.key(id=kin.drone) for kin in settings.kin}
+        self._clearances = clearances(scenario, formation, drone)
         self._memories = memories(scenario, neighbours(scenario, formation, drone))
         self._links = [link.name for link in settings.row.links]
         self._settings = settings
@@ -113,6 +119,9 @@ class Agent:
             heard=self._note_used(self._state),
             unheard=company.unheard,
             lost=company.lost,
+            ahead=output.ahead,
+            pace=output.pace,
+            asked=output.asked,
             step_ns=now_ns,
         )
         self.steps += 1
@@ -152,7 +161,7 @@ class Agent:
 
     def _inputs(self, now_ns: int, pose: Pose, pose_age: float, company: Company) -> Inputs:
         hand, heard = self.senses.hand, self.senses.drones
-        drones, silent = _around(company, now_ns)
+        lag = self._settings.steering.safety.horizontal.lag
         return Inputs(
             position=pose.position,
             velocity=pose.velocity,
@@ -163,12 +172,28 @@ class Agent:
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
             references=[self._reference(heard.get(kin), key, now_ns) for kin, key in self._kin.items()],
-            drones=drones,
-            silent=silent,
+            drones=_around(company, self._clearances, lag, now_ns),
+            obstacles=self._obstacles(now_ns),
             missed=company.missed,
             awaiting=bool(company.awaited),
             alone=company.alone,
         )
+
+    def _obstacles(self, now_ns: int) -> list[Encounter]:
+        safety = self._settings.steering.safety
+        return [
+            walker_seen(
+                state.position,
+                state.velocity,
+                age,
+                safety.horizontal.lag,
+                safety.hand,
+                radius=state.radius,
+                above=state.height + safety.over,
+                below=safety.over,
+            )
+            for state, age in self.senses.obstacles.present(now_ns)
+        ]
 
     def _reference(self, sensed: Sensed[DroneState] | None, key: str, now_ns: int) -> Reference | None:
         if sensed is None:
@@ -214,27 +239,27 @@ def hand_input(sample: HandSample) -> HandInput:
     )
 
 
-def _around(company: Company, now_ns: int) -> tuple[list[Encounter], list[Bystander]]:
-    """Returns where the other drones are, and who of them has fallen silent.
+def _around(company: Company, keep: Mapping[int, Clearance], lag: float, now_ns: int) -> list[Encounter]:
+    """Returns where the other drones are, or may be.
 
-    One that is silent stays there for as long as its body may be in the air, and may drift or fall, but comes
-    no closer. So does one that speaks and is not believed: what it says moves nobody, but it is there.
+    One that is silent, or that does not see itself, may be anywhere from where it was to where it would have
+    come. So may one that speaks and is not believed: what it says moves nobody, but it is there. Who is missed
+    itself stays where the others saw it last, and only keeps off the places where it saw them.
     """
-    encounters, silent = [], []
+    found = []
     for sensed in company.heard:
-        (x, y, _), (u, v, _) = sensed.message.position, sensed.message.velocity
-        encounters.append(Encounter(x, y, u, v))
-        if now_ns - sensed.arrival_ns > _SILENT_NS:
-            silent.append(_bystander(x, y, sensed.age(now_ns)))
+        state = sensed.message
+        age = sensed.age(now_ns) + state.pose_age
+        if age > SILENT_AFTER:
+            found.append(drone_silent(state.position, state.velocity, age, keep[state.id], lag))
+            continue
+        yields = is_airborne(state.mode) and state.id not in company.deaf
+        ahead, pace, asked = state.ahead or state.position, state.pace or state.velocity, state.asked
+        found.append(drone_heard(ahead, pace, asked, age - state.pose_age, keep[state.id], yields=yields))
     for seen in company.missing:
-        x, y, _ = seen.position
-        encounters.append(Encounter(x, y, 0.0, 0.0))
-        silent.append(_bystander(x, y, seen.age))
-    return encounters, silent
-
-
-def _bystander(x: float, y: float, age: float) -> Bystander:
-    return Bystander(x, y, min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST))
+        velocity, age = (ORIGIN, 0.0) if company.missed else (seen.velocity, seen.age)
+        found.append(drone_silent(seen.position, velocity, age, keep[seen.id], lag))
+    return found
 
 
 def memories(scenario: Scenario, others: Iterable[int]) -> dict[int, Memory]:

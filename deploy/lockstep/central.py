@@ -9,7 +9,7 @@ from collections.abc import Set as AbstractSet
 import numpy as np
 
 from agents.control.hand import HandInput, MappedHand
-from agents.settings import drone_row, hand_settings, steering_settings
+from agents.settings import clearances, drone_row, hand_settings, steering_settings, widest
 from deploy.lockstep.flock import Member, advance_flock
 from deploy.lockstep.hand_track import map_samples, track_of
 from deploy.lockstep.record import Moment, Record, make_record
@@ -49,6 +49,7 @@ class Flock:
                 drone_row(scenario, formation, drone),
                 tuple(flock[other] for other in formation.references(drone)),
                 steering_settings(scenario, formation, drone),
+                widest(clearances(scenario, formation, drone)),
                 flyers[row],
             )
         self.members = [flock[drone] for drone in formation.ids]

@@ -12,7 +12,6 @@ import numpy.typing as npt
 import pytest
 from attrs import evolve
 
-from agents.control.avoidance import COLUMN_BUBBLE
 from deploy.lockstep.lockstep import fly_lockstep
 from shared.arrays import rest_of, weights_of
 from shared.config import load_scenario
@@ -27,6 +26,8 @@ pytestmark = pytest.mark.slow
 Vec = npt.NDArray[np.float64]
 
 KEEP = 0.30
+PINNED = 0.24
+"""Between a wall of columns and those that follow."""
 HEADINGS = np.radians(np.arange(0, 360, 15))
 PEAKS = (0.3, 0.5, 0.75, 1.0, 1.25, 1.5)
 STROKES = (0.5, 1.0, 1.5, 2.0)
@@ -122,8 +123,8 @@ def test_a_formation_pushed_against_a_wall_of_columns(shape: str, law: str, angl
         worst = distances(scenario, iter(ticks))
         nearest = min(np.linalg.norm(tick.position[:, :, None, :2] - columns, axis=3).min() for tick in ticks)
         say(f"{shape}, {law}, {peak} m/s, columns {nearest:.3f} m", worst)
-        assert kept(worst)
-        assert nearest >= COLUMN_BUBBLE.radius - 0.02
+        assert kept(worst, drones=PINNED)
+        assert nearest >= 0.20
 
 
 @pytest.mark.parametrize(
