@@ -5,16 +5,17 @@ import gc
 import sys
 
 from agents.agent import Agent
-from agents.loop import run
+from agents.loop import Mouth, run
+from agents.near_links import NearLinks
 from agents.settings import agent_settings
 from agents.vehicles import open_vehicle
-from shared.bus import join
+from shared.bus import join, reach
 from shared.clock import system_clock
 from shared.errors import SwarmTouchError
 from shared.nodes import drone_node
 from shared.process import StatusReporter, add_process_arguments, explain, prepare_process, tell_form
 from shared.scenario_check.checked import check_drone, open_checked
-from shared.topics import DRONE_STATE
+from shared.topics import DRONE_STATE, PLACES
 from shared.transport import Inbox
 from shared.vehicles import vehicle_settings
 
@@ -37,11 +38,17 @@ def main() -> int:
     with bus:
         for key in agent.senses.keys:
             bus.subscribe(key, inbox)
-        publish = bus.publisher(DRONE_STATE, id=args.id)
+        mouth = Mouth(bus.publisher(DRONE_STATE, id=args.id), bus.publisher(PLACES, id=args.id))
+        links = NearLinks(
+            lambda other: reach(scenario, formation, drone_node(args.id), drone_node(other)),
+            agent.senses.keys_of,
+            inbox,
+            clock,
+        )
         # What starting up has left never dies: the collector need not look through it in flight.
         gc.freeze()
         status = StatusReporter(bus, "drone", args.id, clock, tell_form())
-        run(agent, vehicle, inbox, publish, status, clock, stopping)
+        run(agent, vehicle, inbox, mouth, links, status, clock, stopping)
         vehicle.close()
     return 0
 

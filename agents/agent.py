@@ -11,15 +11,16 @@ from agents.control.steering import Bystander
 from agents.control.step import Inputs, Settings, State, start, step
 from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
+from agents.vicinity import Vicinity
 from shared.clock import NS_PER_S
 from shared.fence import bodies_of
 from shared.formation import Formation
-from shared.messages import NO_HAND, DroneState, Flag, HandSample, Heard
+from shared.messages import NO_HAND, DroneState, Flag, HandSample, Heard, Places, Seen
 from shared.net.keyring import hand_verifier
 from shared.nodes import neighbours
 from shared.scenario import Scenario
 from shared.senses import Sensed, Senses
-from shared.topics import DRONE_STATE, HAND
+from shared.topics import DRONE_STATE, HAND, PLACES
 from shared.transport import Arrival
 from shared.vehicles import vehicle_settings
 
@@ -32,6 +33,8 @@ SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
 """... from this distance on, growing at this rate, up to this, m and m/s."""
 DOUBTED_FOR = 1.0
 """That somebody says what cannot be believed is told for this long, s."""
+_LOOK_PERIOD_NS = NS_PER_S // 10
+_PLACES_PERIOD_NS = round(NS_PER_S / PLACES.rate_hz)
 _DOUBTED_NS = round(DOUBTED_FOR * NS_PER_S)
 _SILENT_NS = round(SILENT_AFTER * NS_PER_S)
 
@@ -50,15 +53,25 @@ class Agent:
     def __init__(
         self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
     ) -> None:
+        always = neighbours(scenario, formation, drone)
+        self.vicinity = None
+        if len(always) < len(formation.ids) - 1:
+            self.vicinity = Vicinity(drone, always, formation.ids)
         self.senses = Senses(
-            neighbours(scenario, formation, drone), hand_verifier(scenario.net), bodies_of(scenario, formation)
+            always,
+            hand_verifier(scenario.net),
+            bodies_of(scenario, formation),
+            places=self.vicinity is not None,
         )
         self.steps = 0
         self._drone = drone
         self._epoch = epoch
         self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
         self._kin = {kin.drone: DRONE_STATE.key(id=kin.drone) for kin in settings.kin}
-        self._memories = memories(scenario, neighbours(scenario, formation, drone))
+        self._always = always
+        self._memories = memories(scenario, [other for other in formation.ids if other != drone])
+        self._listened = {other: self._memories[other] for other in always}
+        self._look_due_ns = self._places_due_ns = self._told = 0
         self._links = [link.name for link in settings.row.links]
         self._settings = settings
         self._rule = step_rule(scenario.rates)
@@ -66,6 +79,11 @@ class Agent:
         self._state: State | None = None
         self._used: dict[str, Sensed[HandSample] | Sensed[DroneState]] = {}
         self._last_step_ns = 0
+
+    @property
+    def near(self) -> frozenset[int]:
+        """Whom to hear directly for a while, beside those whom this drone always hears."""
+        return frozenset() if self.vicinity is None else self.vicinity.near
 
     def receive(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Takes in what the bus delivered."""
@@ -90,6 +108,7 @@ class Agent:
         if self._state is None:
             self._state = start(pose.position, self._settings, airborne=pose.airborne)
         dt = (now_ns - self._last_step_ns) / NS_PER_S if self.steps else self._nominal_dt
+        self._look_afar(now_ns, pose)
         company = self._look_around(now_ns)
         inputs = self._inputs(now_ns, pose, pose_age, company)
         self._state, output = step(self._state, inputs, self._settings, dt)
@@ -142,13 +161,49 @@ class Agent:
     def _is_fresh(self, key: str, sensed: Sensed[HandSample] | Sensed[DroneState]) -> bool:
         return self._used.get(key) is not sensed
 
+    def places(self, state: DroneState) -> Places | None:
+        """Returns what to tell of everybody after a step, None while there is nothing to be told.
+
+        In a swarm in which everybody hears everybody nobody is told of others.
+        """
+        if self.vicinity is None or state.step_ns < self._places_due_ns:
+            return None
+        self._places_due_ns = state.step_ns + _PLACES_PERIOD_NS
+        own = Seen(state.id, state.epoch, state.seq, state.position, state.velocity, state.mode, 0.0)
+        told = self.vicinity.tell(own, self.senses.drones, state.step_ns)
+        self._told += 1
+        return Places(epoch=state.epoch, seq=self._told - 1, stamp_ns=state.stamp_ns, id=state.id, seen=told)
+
+    def _look_afar(self, now_ns: int, pose: Pose) -> None:
+        """Takes in what was told of others, and decides anew whom to listen to."""
+        if self.vicinity is None or now_ns < self._look_due_ns:
+            return
+        self._look_due_ns = now_ns + _LOOK_PERIOD_NS
+        vicinity, senses = self.vicinity, self.senses
+        vicinity.hear(senses.places)
+        senses.places.clear()
+        before = vicinity.near
+        vicinity.look(pose.position, pose.velocity, senses.drones, now_ns)
+        if vicinity.near != before:
+            senses.listen(vicinity.near)
+        if before or vicinity.near:
+            counted = (*self._always, *vicinity.counted(senses.drones, now_ns))
+            self._listened = {other: self._memories[other] for other in counted}
+
     def _look_around(self, now_ns: int) -> Company:
         senses = self.senses
         doubted: dict[int, int] = {}
         if senses.doubted_ns:
-            keys = {drone: DRONE_STATE.key(id=drone) for drone in self._memories}
+            keys = {drone: DRONE_STATE.key(id=drone) for drone in self._listened}
             doubted = {drone: senses.doubted_ns[key] for drone, key in keys.items() if key in senses.doubted_ns}
-        return look_around(self._drone, self._memories, senses.drones, doubted, now_ns)
+        if self.vicinity is None:
+            return look_around(self._drone, self._listened, senses.drones, doubted, now_ns)
+        silent = [drone for drone in self._listened if not senses.has_heard(drone, now_ns)]
+        told = {seen.id: seen for seen in self.vicinity.told_of(silent, now_ns)}
+        company = look_around(self._drone, self._listened, senses.drones, doubted, now_ns, told)
+        # Whoever has just come near is kept away from as it was told, until it is heard.
+        coming = [drone for drone in self.vicinity.near if drone not in self._listened]
+        return company._replace(missing=[*company.missing, *self.vicinity.told_of(coming, now_ns)])
 
     def _inputs(self, now_ns: int, pose: Pose, pose_age: float, company: Company) -> Inputs:
         hand, heard = self.senses.hand, self.senses.drones

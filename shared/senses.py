@@ -10,12 +10,12 @@ from msgspec.structs import replace
 from shared.clock import NS_PER_S
 from shared.codec import decode
 from shared.errors import DecodeError
-from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, ObstacleState, Wish
+from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, ObstacleState, Places, Wish
 from shared.obstacle_watch import ObstacleWatch
 from shared.order import Sample, check_newer
 from shared.plausibility import HAND_LIMITS, Believed, MotionLimits, believe, check_possible
 from shared.signature import Verify
-from shared.topics import DRONE_STATE, HAND, OBSTACLE, parse_key
+from shared.topics import DRONE_STATE, HAND, OBSTACLE, PLACES, parse_key
 from shared.transport import Arrival
 
 M = TypeVar("M", bound=Message)
@@ -57,11 +57,13 @@ class Senses:
         verify: Checks the signature of hand samples; None accepts unsigned ones.
         bodies: What the bodies of drones can do; None believes everything, as one who only shows it does.
         obstacles: Whether to listen to moving obstacles as well.
+        places: Whether to listen to what drones tell of others.
 
     Attributes:
         hand: Newest hand sample, None before the first.
         drones: Newest state per drone that was ever heard.
         obstacles: What is known of moving obstacles.
+        places: What drones have told of others since somebody took it from here.
         doubted_ns: When something that was not believed last came, by key (own clock).
         rejected: Dropped samples by reason.
     """
@@ -73,24 +75,51 @@ class Senses:
         bodies: MotionLimits | None = None,
         *,
         obstacles: bool = False,
+        places: bool = False,
     ) -> None:
         self.hand: Sensed[HandSample] | None = None
         self.drones: dict[int, Sensed[DroneState]] = {}
         self.obstacles = ObstacleWatch()
+        self.places: list[Sensed[Places]] = []
         self._hears_obstacles = obstacles
+        self._hears_places = places
+        self._tellers: dict[int, Sample] = {}
         self.rejected: Counter[str] = Counter()
         self.doubted_ns: dict[str, int] = {}
         self._verify = verify
         self._bodies = bodies
         self._believed: dict[int, Believed] = {}
         self._believed_hand: Believed | None = None
-        self._ids = {DRONE_STATE.key(id=drone): drone for drone in ids}
+        self._always = tuple(ids)
+        self._ids = {DRONE_STATE.key(id=drone): drone for drone in self._always}
         self._logged_ns = 0
 
     @property
     def keys(self) -> list[str]:
         """Returns the keys to subscribe to."""
-        return [_HAND_KEY, *self._ids, *((OBSTACLE.wildcard,) if self._hears_obstacles else ())]
+        return [
+            _HAND_KEY,
+            *(key for drone in self._always for key in self.keys_of(drone)),
+            *((OBSTACLE.wildcard,) if self._hears_obstacles else ()),
+        ]
+
+    def keys_of(self, drone: int) -> list[str]:
+        """Returns the keys of one drone to subscribe to."""
+        places = [PLACES.key(id=drone)] if self._hears_places else []
+        return [DRONE_STATE.key(id=drone), *places]
+
+    def listen(self, drones: Iterable[int]) -> None:
+        """Listens to these drones beside those that it always listens to, from now on."""
+        self._ids = {DRONE_STATE.key(id=drone): drone for drone in (*self._always, *drones)}
+
+    def has_heard(self, drone: int, now_ns: int) -> bool:
+        """Says whether the newest state of a drone is still current."""
+        sensed = self.drones.get(drone)
+        return sensed is not None and sensed.age(now_ns) <= DRONE_STATE.stale_s
+
+    def hears(self, drone: int) -> bool:
+        """Says whether it listens to a drone."""
+        return DRONE_STATE.key(id=drone) in self._ids
 
     def take(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Decodes what has arrived; nothing that anyone sends raises."""
@@ -142,7 +171,7 @@ class Senses:
             return
         drone = self._ids.get(key)
         if drone is None:
-            self._take_obstacle(key, payload, arrival_ns)
+            self._take_other(key, payload, arrival_ns)
             return
         state = decode(payload, DroneState)
         if state.id != drone:
@@ -153,11 +182,32 @@ class Senses:
             self._believe(key, sensed, self._bodies)
         self.drones[drone] = sensed
 
-    def _take_obstacle(self, key: str, payload: bytes, arrival_ns: int) -> None:
+    def hear_places(self, sensed: Sensed[Places]) -> None:
+        """Takes in what a drone tells of others.
+
+        Raises:
+            DecodeError: It is not newer than what that one told last.
+        """
+        told, order = sensed.message, _order(sensed)
+        if (known := self._tellers.get(told.id)) is not None:
+            check_newer(order, known, PLACES.stale_s)
+        self._tellers[told.id] = order
+        self.places.append(sensed)
+
+    def _take_other(self, key: str, payload: bytes, arrival_ns: int) -> None:
         place = parse_key(key)
-        if place.topic is not OBSTACLE or not self._hears_obstacles:
+        if place.topic is OBSTACLE and self._hears_obstacles:
+            self.obstacles.hear(place.id, decode(payload, ObstacleState), arrival_ns)
+        elif place.topic is PLACES and self._hears_places and self.hears(place.id):
+            told = decode(payload, Places)
+            if told.id != place.id:
+                raise DecodeError("wrong-id", f"drone {told.id} on {key}")
+            if self._bodies is not None:
+                for seen in told.seen:
+                    check_possible(seen.position, seen.velocity, self._bodies)
+            self.hear_places(Sensed(told, arrival_ns))
+        else:
             raise DecodeError("unknown-key", key)
-        self.obstacles.hear(place.id, decode(payload, ObstacleState), arrival_ns)
 
     def _check_drone(self, sensed: Sensed[DroneState]) -> None:
         if (known := self.drones.get(sensed.message.id)) is not None:

@@ -20,14 +20,28 @@ from deploy.lockstep.start import EPOCH, introduce, rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.codec import encode
 from shared.formation import Formation
-from shared.messages import DroneState, HandSample, Mode, Vector
+from shared.messages import DroneState, HandSample, Mode, Places, Vector
 from shared.scenario import Scenario
-from shared.senses import Sensed
-from shared.topics import DRONE_STATE, HAND
+from shared.senses import Sensed, Senses
+from shared.topics import DRONE_STATE, HAND, PLACES
 from shared.transport import Arrival
 
 _HAND_KEY = HAND.key()
 _COMMANDS = dict.fromkeys(Mode, FLY) | {Mode.STOP: CUT, Mode.GROUND: IDLE}
+
+
+def hand_over(senses: Senses, message: HandSample | DroneState | Places, now_ns: int) -> None:
+    """Hands a message over as it is.
+
+    Raises:
+        DecodeError: It is not newer than the last one of its kind.
+    """
+    if isinstance(message, HandSample):
+        senses.hear_hand(Sensed(message, now_ns))
+    elif isinstance(message, DroneState):
+        senses.hear_drone(Sensed(message, now_ns))
+    else:
+        senses.hear_places(Sensed(message, now_ns))
 
 
 class Lockstep:
@@ -62,10 +76,6 @@ class Lockstep:
         ]
         introduce(self._agents, formation, self.flyers)
         self._keys = [DRONE_STATE.key(id=drone) for drone in formation.ids]
-        self._listeners = {
-            key: [agent.senses for agent in self._agents if key in agent.senses.keys]
-            for key in (_HAND_KEY, *self._keys)
-        }
 
     def advance(self, sample: HandSample) -> list[DroneState]:
         """Makes one tick.
@@ -80,8 +90,11 @@ class Lockstep:
         self._publish(_HAND_KEY, sample, now)
         states: dict[int, DroneState] = {}
         for row in self._order:
-            states[row] = self._agents[row].step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
+            agent = self._agents[row]
+            states[row] = agent.step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
             self._publish(self._keys[row], states[row], now)
+            if (told := agent.places(states[row])) is not None:
+                self._publish(PLACES.key(id=told.id), told, now)
         ordered = [states[row] for row in range(len(states))]
         self.followed.update(state.id for state in ordered if state.mode is Mode.FOLLOW)
         duration = tick_length(self.tick, self._rate)
@@ -92,19 +105,18 @@ class Lockstep:
         self.tick += 1
         return ordered
 
-    def _publish(self, key: str, message: HandSample | DroneState, now_ns: int) -> None:
+    def _publish(self, key: str, message: HandSample | DroneState | Places, now_ns: int) -> None:
+        payload = b""
         if self._encoded:
             self.payloads[key] = payload = encode(message)
-            for senses in self._listeners[key]:
+        for agent in self._agents:
+            senses = agent.senses
+            if not isinstance(message, HandSample) and not senses.hears(message.id):
+                continue
+            if self._encoded:
                 senses.take({key: [Arrival(payload, now_ns)]})
-        elif isinstance(message, HandSample):
-            sample = Sensed(message, now_ns)
-            for senses in self._listeners[key]:
-                senses.hear_hand(sample)
-        else:
-            state = Sensed(message, now_ns)
-            for senses in self._listeners[key]:
-                senses.hear_drone(state)
+            else:
+                hand_over(senses, message, now_ns)
 
 
 def fly_lockstep(
