@@ -7,8 +7,8 @@ import sys
 import sysconfig
 from pathlib import Path
 
-COST = "a control step takes three times as long, a simulation four"
-"""What the pure form costs (docs/performance.md)."""
+COST = "a control step takes five times as long"
+"""What the pure form costs, in a loop (`swarmtouch bench step`)."""
 
 
 def c_compiler() -> str:
