@@ -99,7 +99,7 @@ class ChaosFlight(Swarm):
             self._issue_keys(raw.swarm.name, nodes)
         net = Net(
             profile=self._profile,
-            interface="mesh",
+            interface="mesh" if self._profile == "radio" else "lo",
             keys=str(self._keyring.folder) if keys else "",
             endpoints={node: self._endpoint(self.lab.mesh(node)) for node in nodes},
             router=self._endpoint(self.lab.mesh(ROUTER)) if self._routed else None,

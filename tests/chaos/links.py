@@ -18,6 +18,8 @@ STALLED_S = 2.0
 HEALED_S = 2.0
 """The swarm follows again so soon after a partition."""
 BAD_WEATHER = Weather(delay=0.05, jitter=0.02, loss=0.2, duplicate=0.05)
+CUT = 2
+"""Who is cut off."""
 WORSE = 1.15
 """How much worse the swarm may follow in bad weather."""
 
@@ -35,9 +37,11 @@ def partition(seconds: float, protocol: str) -> Fly:
             recorder.listen(seconds)
             modes = {recorder.latest(drone).mode for drone in rest}
             drift = watch.drift(rest, (2.0, min(seconds, 9.5)))
-            led = only(leader, Mode.FOLLOW)
-            lab.heal()
             landed = seconds > 10.0
+            # It hears its hand, but nobody who could keep away from it.
+            led = only(leader, Mode.FOLLOW, Mode.HOLD, *((Mode.LAND, Mode.GROUND) if landed else ()))
+            held = recorder.latest(1).mode is not Mode.FOLLOW
+            lab.heal()
             designed = {Mode.LAND, Mode.GROUND} if landed else {Mode.HOLD}
             back = wait(flight, lambda: recorder.all_in(Mode.GROUND, rest) if landed else all_follow(flight))
             recorder.listen(2.0)
@@ -49,7 +53,7 @@ def partition(seconds: float, protocol: str) -> Fly:
                 recovered_s=back,
                 demands=[
                     (modes <= designed, "HOLD, or LAND after 10 s"),
-                    (led, "drone 1 follows its hand"),
+                    (led and held, "drone 1, alone with its hand, holds as well"),
                     (drift <= 0.3, "drift of at most 0.3 m"),
                     (not landed or all(recorder.latest(i).mode is Mode.GROUND for i in rest), "down for good"),
                     (ages.max() < STALLED_S, "no link between healthy nodes stalls"),
@@ -59,6 +63,43 @@ def partition(seconds: float, protocol: str) -> Fly:
                     (ages.max(), FRESH_S, "data between healthy nodes younger than 0.3 s"),
                 ],
                 notes=[f"drift {drift:.2f} m, oldest data between healthy nodes {1e3 * ages.max():.0f} ms"],
+            )
+
+    return fly
+
+
+def cut_off(protocol: str) -> Fly:
+    """Cuts one drone off from the mesh for 20 s, in the middle of a moving formation.
+
+    On a radio it still hears the hand: what it does not hear are the others.
+    """
+
+    def fly(folder: Path) -> Row:
+        with chaos_flight(folder, "scripted:eight?peak=0.6", protocol=protocol) as flight:
+            recorder, lab = flight.recorder, flight.lab
+            others = tuple(drone for drone in flight.ids if drone != CUT)
+            watch = Watch(flight, recorder.clock(), others)
+            lonely = Watch(flight, watch.start_ns, (CUT,))
+            heard = {drone_node(CUT), *((RELAY,) if protocol == "radio" else ())}
+            lab.part((drone_node(CUT),), [node for node in flight.nodes if node not in heard])
+            recorder.listen(20.0)
+            modes = lonely.modes(CUT)
+            flew_on = all(recorder.latest(drone).mode is Mode.FOLLOW for drone in others)
+            lab.heal()
+            back = wait(flight, lambda: all(Flag.MISSED not in recorder.latest(i).flags for i in flight.ids))
+            recorder.listen(3.0)
+            down = recorder.latest(CUT).mode is Mode.GROUND
+            return judge(
+                f"cut drone {CUT} off for 20 s, {protocol}",
+                watch,
+                recovered_s=back,
+                demands=[
+                    (modes[-2:] == (Mode.LAND, Mode.GROUND), "it lands by its own ladder"),
+                    (Mode.HOLD in modes, "it holds before"),
+                    (flew_on, "the others fly on"),
+                    (down, "it stays down when it is heard again: the operator has to ask"),
+                ],
+                notes=[f"drone {CUT}: {'-'.join(modes)}"],
             )
 
     return fly

@@ -3,6 +3,7 @@
 from tests.chaos.kills import kill_bystander, kill_drones, kill_relay, kill_router, restart_drone
 from tests.chaos.links import (
     bad_weather,
+    cut_off,
     lose_packets,
     partition,
     rejoin_in_bad_weather,
@@ -27,6 +28,7 @@ PLANS: dict[str, Fly] = {
     "part": partition(8.0, "udp"),
     "part-tcp": partition(8.0, "tcp"),
     "part-long": partition(20.0, "udp"),
+    **{f"cut-{protocol}": cut_off(protocol) for protocol in ("tcp", "udp", "radio")},
     "loss": lose_packets,
     "weather": bad_weather(60.0),
     "rejoin": rejoin_in_bad_weather,

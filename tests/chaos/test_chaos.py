@@ -11,7 +11,19 @@ pytestmark = [pytest.mark.container, pytest.mark.timeout(180)]
 
 
 @pytest.mark.parametrize(
-    "name", ["kill-1", "kill-two", "restart", "kill-router", "freeze", "unheard", "simplex", "garbage"]
+    "name",
+    [
+        "cut-tcp",
+        "cut-radio",
+        "kill-1",
+        "kill-two",
+        "restart",
+        "kill-router",
+        "freeze",
+        "unheard",
+        "simplex",
+        "garbage",
+    ],
 )
 def test_the_swarm_does_as_designed(name: str, tmp_path: Path) -> None:
     if reason := obstacle():
