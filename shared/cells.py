@@ -7,8 +7,6 @@ from typing import Final, Generic, TypeVar, final
 class Place:
     """Where something is in the plane, m."""
 
-    __slots__ = ("x", "y")
-
     def __init__(self, x: float, y: float) -> None:
         self.x: Final = x
         self.y: Final = y
@@ -28,8 +26,6 @@ class Cells(Generic[P]):
     Attributes:
         cells: The places in each cell, column by column.
     """
-
-    __slots__ = ("_columns", "_low_x", "_low_y", "_reach", "_rows", "_side", "cells")
 
     def __init__(self, places: list[P], reach: float) -> None:
         low_x = low_y = math.inf
@@ -70,8 +66,6 @@ class Cells(Generic[P]):
 
 @final
 class _Numbered(Place):
-    __slots__ = ("number",)
-
     def __init__(self, number: int, x: float, y: float) -> None:
         super().__init__(x, y)
         self.number: Final = number

@@ -9,6 +9,7 @@ spent by moving, so many small jumps get nobody further than one large one. Stam
 """
 
 import math
+from dataclasses import dataclass
 from typing import Final, final
 
 from shared.clock import NS_PER_S
@@ -27,6 +28,7 @@ BEYOND_FENCE = 2.0
 
 
 @final
+@dataclass(frozen=True, kw_only=True)
 class MotionLimits:
     """What is possible.
 
@@ -38,20 +40,11 @@ class MotionLimits:
         high: Upper corner, m.
     """
 
-    def __init__(
-        self,
-        *,
-        speed: float,
-        vertical_speed: float,
-        slack: float,
-        low: Vector = NOWHERE,
-        high: Vector = UNBOUNDED,
-    ) -> None:
-        self.speed: Final = speed
-        self.vertical_speed: Final = vertical_speed
-        self.slack: Final = slack
-        self.low: Final = low
-        self.high: Final = high
+    speed: float
+    vertical_speed: float
+    slack: float
+    low: Vector = NOWHERE
+    high: Vector = UNBOUNDED
 
 
 HAND_LIMITS = MotionLimits(speed=10.0, vertical_speed=10.0, slack=0.3)

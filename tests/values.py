@@ -11,12 +11,13 @@ T = TypeVar("T")
 def fields(value: object) -> dict[str, Any]:
     """The public fields of a value by name, compiled or not."""
     kinds = reversed(type(value).__mro__)
-    names = [name for kind in kinds for name in getattr(kind, "__mypyc_attrs__", None) or _slots(kind)]
+    # Compiled ones have no dictionary.
+    names = [name for kind in kinds for name in _slots(kind)] or vars(value)
     return {name: getattr(value, name) for name in dict.fromkeys(names) if not name.startswith("_")}
 
 
 def _slots(kind: type) -> Iterable[str]:
-    found: Iterable[str] = vars(kind).get("__slots__", ())
+    found: Iterable[str] = getattr(kind, "__mypyc_attrs__", None) or vars(kind).get("__slots__", ())
     return found
 
 

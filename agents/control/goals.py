@@ -1,6 +1,7 @@
 """The goal of one drone from its references and links: one row of the formation's matrix (Eqs. 11-13)."""
 
 import math
+from dataclasses import dataclass
 from typing import Final, final
 
 from agents.control.hand import MappedHand
@@ -18,8 +19,6 @@ class Guide:
         mode: Its mode, or that of whoever stands behind it.
     """
 
-    __slots__ = ("goal_velocity", "mode", "point")
-
     def __init__(self, point: Vector, goal_velocity: Vector, mode: Mode) -> None:
         self.point: Final = point
         self.goal_velocity: Final = goal_velocity
@@ -27,6 +26,7 @@ class Guide:
 
 
 @final
+@dataclass(frozen=True)
 class Row:
     """One row of a formation.
 
@@ -38,21 +38,11 @@ class Row:
         heights: Rest heights of the references above the hand, m; None uses those of their points.
     """
 
-    __slots__ = ("heights", "links", "offset", "scale", "weights")
-
-    def __init__(
-        self,
-        weights: tuple[float, ...],
-        offset: Vector,
-        links: tuple[Link, ...],
-        scale: float,
-        heights: tuple[float, ...] | None,
-    ) -> None:
-        self.weights: Final = weights
-        self.offset: Final = offset
-        self.links: Final = links
-        self.scale: Final = scale
-        self.heights: Final = heights
+    weights: tuple[float, ...]
+    offset: Vector
+    links: tuple[Link, ...]
+    scale: float
+    heights: tuple[float, ...] | None
 
 
 def correction(row: Row, states: tuple[LinkState, ...]) -> tuple[Vector, Vector]:

@@ -5,6 +5,7 @@ clock: agents that use the same samples map them to the same point, whenever the
 """
 
 import math
+from dataclasses import dataclass
 from typing import Final, final
 
 from agents.control.vectors import ORIGIN, Vector, clamp, norm, shorten
@@ -27,8 +28,6 @@ class HandInput:
         stamp: Time of the sample on its source's clock, s; only differences are used.
     """
 
-    __slots__ = ("position", "stamp", "velocity", "yaw")
-
     def __init__(self, position: Vector, velocity: Vector, yaw: float, stamp: float) -> None:
         self.position: Final = position
         self.velocity: Final = velocity
@@ -48,8 +47,6 @@ class MappedHand:
         stamp: Stamp of the sample it was made from, s.
     """
 
-    __slots__ = ("point", "stamp", "velocity", "yaw", "yaw_rate")
-
     def __init__(self, point: Vector, velocity: Vector, yaw: float, yaw_rate: float, stamp: float) -> None:
         self.point: Final = point
         self.velocity: Final = velocity
@@ -59,6 +56,7 @@ class MappedHand:
 
 
 @final
+@dataclass(frozen=True, kw_only=True)
 class HandSettings:
     """How the hand is mapped.
 
@@ -73,28 +71,14 @@ class HandSettings:
         radius: Distance of the outermost drone at rest, m.
     """
 
-    __slots__ = ("follow_yaw", "gain", "height", "high", "low", "max_speed", "offset", "radius")
-
-    def __init__(
-        self,
-        *,
-        gain: float,
-        offset: Vector,
-        height: float | None,
-        follow_yaw: bool,
-        max_speed: float,
-        low: Vector,
-        high: Vector,
-        radius: float,
-    ) -> None:
-        self.gain: Final = gain
-        self.offset: Final = offset
-        self.height: Final = height
-        self.follow_yaw: Final = follow_yaw
-        self.max_speed: Final = max_speed
-        self.low: Final = low
-        self.high: Final = high
-        self.radius: Final = radius
+    gain: float
+    offset: Vector
+    height: float | None
+    follow_yaw: bool
+    max_speed: float
+    low: Vector
+    high: Vector
+    radius: float
 
 
 def map_hand(previous: MappedHand | None, sample: HandInput, settings: HandSettings) -> MappedHand:

@@ -5,6 +5,7 @@ exact for any damping and any dt > 0 (DESIGN section 4); the paper's printed `Ad
 """
 
 import math
+from dataclasses import dataclass
 from typing import Final, final
 
 from agents.control.vectors import ORIGIN, Vector
@@ -28,8 +29,6 @@ class Spring:
         gain: Kv, N s/m.
     """
 
-    __slots__ = ("_dt", "_transition", "damping", "gain", "mass", "stiffness")
-
     def __init__(self, mass: float, damping: float, stiffness: float, gain: float) -> None:
         self.mass: Final = mass
         self.damping: Final = damping
@@ -47,6 +46,7 @@ class Spring:
 
 
 @final
+@dataclass(frozen=True)
 class Link:
     """One impedance link into a drone.
 
@@ -56,19 +56,14 @@ class Link:
         limit: Bound of the displacement per axis, m.
     """
 
-    __slots__ = ("limit", "name", "spring")
-
-    def __init__(self, name: str, spring: Spring, limit: float) -> None:
-        self.name: Final = name
-        self.spring: Final = spring
-        self.limit: Final = limit
+    name: str
+    spring: Spring
+    limit: float
 
 
 @final
 class LinkState:
     """Displacement, m, and rate, m/s, of one link in the formation's frame."""
-
-    __slots__ = ("displacement", "rate")
 
     def __init__(self, displacement: Vector, rate: Vector) -> None:
         self.displacement: Final = displacement

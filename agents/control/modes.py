@@ -63,19 +63,6 @@ class ModeInputs:
         alone: It hears nobody although there are others.
     """
 
-    __slots__ = (
-        "alone",
-        "awaiting",
-        "battery",
-        "hand_age",
-        "height",
-        "missed_for",
-        "pose_age",
-        "references_follow",
-        "takeoff_height",
-        "wish",
-    )
-
     def __init__(
         self,
         wish: Wish | None,
@@ -110,8 +97,6 @@ class ModeState:
         mode: The flight mode.
         must_ask_again: Set by a landing that the operator did not wish; cleared by any wish but FLY.
     """
-
-    __slots__ = ("mode", "must_ask_again")
 
     def __init__(self, mode: Mode, *, must_ask_again: bool = False) -> None:
         self.mode: Final = mode

@@ -6,6 +6,7 @@ takes over, and gives back, step by step within a second; who returns has to be 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final, final
 
 from agents.control import modes
@@ -26,6 +27,7 @@ RETURN_AFTER: Final = 1.0
 
 
 @final
+@dataclass(frozen=True)
 class Kin:
     """One ancestor in the reference graph.
 
@@ -35,12 +37,9 @@ class Kin:
         references: Its own references, as places in the tuple of kin.
     """
 
-    __slots__ = ("drone", "references", "row")
-
-    def __init__(self, drone: int, row: Row, references: tuple[int, ...]) -> None:
-        self.drone: Final = drone
-        self.row: Final = row
-        self.references: Final = references
+    drone: int
+    row: Row
+    references: tuple[int, ...]
 
 
 @final
@@ -52,8 +51,6 @@ class Reference(Guide):
         age: Time since its sample arrived, s.
         fresh: Whether the sample is newer than the one of the last step.
     """
-
-    __slots__ = ("age", "fresh", "velocity")
 
     def __init__(
         self, point: Vector, goal_velocity: Vector, mode: Mode, velocity: Vector, age: float, *, fresh: bool
@@ -73,8 +70,6 @@ class StandIn:
         heard_for: How long it has been fit to lead again without a gap, s.
         links: Its links, simulated while the stand-in has a share.
     """
-
-    __slots__ = ("heard_for", "links", "share")
 
     def __init__(self, share: float, heard_for: float, links: tuple[LinkState, ...]) -> None:
         self.share: Final = share

@@ -24,8 +24,6 @@ class Trajectory:
         goal: Goal of the last step, m.
     """
 
-    __slots__ = ("goal", "lead", "point", "velocity")
-
     def __init__(self, point: Vector, velocity: Vector, lead: Vector, goal: Vector) -> None:
         self.point: Final = point
         self.velocity: Final = velocity

@@ -45,21 +45,6 @@ class Member:
         encounter: What those see who keep off it.
     """
 
-    __slots__ = (
-        "encounter",
-        "flyer",
-        "goal",
-        "goal_velocity",
-        "guide",
-        "links",
-        "position",
-        "references",
-        "row",
-        "setpoint",
-        "steering",
-        "trajectory",
-    )
-
     def __init__(
         self, row: Row, references: "tuple[Member, ...]", steering: SteeringSettings, flyer: Flyer
     ) -> None:

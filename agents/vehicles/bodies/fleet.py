@@ -22,8 +22,6 @@ BODIES: Final[dict[str, Model]] = {"identified": Identified(), "crazyflie": Craz
 class Flyer:
     """One body, what moves it, and whether a hand holds it in place."""
 
-    __slots__ = ("body", "held", "model")
-
     def __init__(self, body: Body, model: Model, *, held: bool = False) -> None:
         self.body: Final = body
         self.model: Final = model

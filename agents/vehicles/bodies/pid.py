@@ -5,6 +5,7 @@ a set-point step kicks once. Outputs are tilt in degrees (x, y) and motor comman
 """
 
 import math
+from dataclasses import dataclass
 from typing import Final, final
 
 from agents.control.vectors import ORIGIN, Vector
@@ -24,6 +25,7 @@ Tick = tuple[float, float, float]
 
 
 @final
+@dataclass(frozen=True)
 class Pid:
     """The controller of one axis.
 
@@ -37,18 +39,13 @@ class Pid:
         grounded: Integral on the ground, m s.
     """
 
-    __slots__ = ("grounded", "high", "kd", "ki", "kp", "limit", "low")
-
-    def __init__(
-        self, kp: float, kd: float, ki: float, *, limit: float, low: float, high: float, grounded: float
-    ) -> None:
-        self.kp: Final = kp
-        self.kd: Final = kd
-        self.ki: Final = ki
-        self.limit: Final = limit
-        self.low: Final = low
-        self.high: Final = high
-        self.grounded: Final = grounded
+    kp: float
+    kd: float
+    ki: float
+    limit: float
+    low: float
+    high: float
+    grounded: float
 
     def tick(
         self, error: float, integral: float, previous: float, output: float, *, flying: bool, grounded: bool

@@ -49,18 +49,6 @@ class Body:
         wait: Time to the next controller tick, s.
     """
 
-    __slots__ = (
-        "error",
-        "integral",
-        "output",
-        "position",
-        "thrust",
-        "tilt",
-        "tilt_rate",
-        "velocity",
-        "wait",
-    )
-
     def __init__(
         self,
         position: Vector,
