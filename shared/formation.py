@@ -107,7 +107,7 @@ class Formation:
         """Returns the impedance links into one drone."""
         return self._links.get(self.row(drone), ())
 
-    @property
+    @cached_property
     def radius(self) -> float:
         """Horizontal distance of the outermost drone from the mapped hand at rest, m."""
         return max(math.hypot(x, y) for x, y, _ in self.rest)

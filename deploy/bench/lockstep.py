@@ -12,6 +12,7 @@ from agents.settings import hand_settings
 from deploy.bench.figures import spread
 from deploy.bench.report import INK, Json, Report, Sheet
 from deploy.lockstep.central import Flock
+from deploy.lockstep.collector import no_collector
 from deploy.lockstep.hand_track import map_samples, relayed
 from deploy.lockstep.lockstep import Lockstep
 from deploy.lockstep.start import rest_places, start_flyers
@@ -58,7 +59,8 @@ def measure(
         say(f"{number} drones, {kind}")
         samples = relayed("scripted:tour?lead=1", LONGEST_S, settings.rates.control_hz)
         run = _agents if kind == "agents" else _flock
-        times = _timed(run(settings, formation, samples), seconds)
+        with no_collector():
+            times = _timed(run(settings, formation, samples), seconds)
         records.append(_record(number, kind, times, settings.rates.control_hz))
     return Report(
         name="lockstep",

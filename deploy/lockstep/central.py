@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 
 import numpy as np
+from attrs import evolve
 
 from agents.control.hand import HandInput, MappedHand
+from agents.control.steering import SteeringSettings
 from agents.settings import drone_row, hand_settings, steering_settings
 from deploy.lockstep.flock import Member, advance_flock
 from deploy.lockstep.hand_track import map_samples, track_of
@@ -17,7 +19,8 @@ from deploy.lockstep.start import rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length
 from shared.formation import Formation
 from shared.messages import HandSample, Vector
-from shared.scenario import Scenario
+from shared.scenario import Scenario, VehicleSettings
+from shared.vehicles import vehicle_settings
 
 
 class Flock:
@@ -43,12 +46,17 @@ class Flock:
     ) -> None:
         flyers = start_flyers(scenario, formation, places, airborne=True, held=held)
         flock: dict[int, Member] = {}
+        steering: dict[VehicleSettings, SteeringSettings] = {}
         for row in (row for level in formation.levels for row in level):
             drone = formation.ids[row]
+            # Drones with equal vehicles steer alike.
+            vehicle = evolve(vehicle_settings(scenario, drone), uri=None)
+            if vehicle not in steering:
+                steering[vehicle] = steering_settings(scenario, formation, drone)
             flock[drone] = Member(
                 drone_row(scenario, formation, drone),
                 tuple(flock[other] for other in formation.references(drone)),
-                steering_settings(scenario, formation, drone),
+                steering[vehicle],
                 flyers[row],
             )
         self.members = [flock[drone] for drone in formation.ids]

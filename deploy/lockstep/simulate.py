@@ -10,6 +10,7 @@ from attrs import frozen
 from agents.vehicles.world.setup import referee_rules
 from deploy.launcher.process_table import hint_overrides
 from deploy.lockstep.central import fly_central
+from deploy.lockstep.collector import no_collector
 from deploy.lockstep.hand_track import relayed
 from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.picture import draw
@@ -69,7 +70,8 @@ def simulate(options: Options) -> dict[str, Any]:
     samples = relayed(options.hand, options.seconds, rates.control_hz, rates.hand_hz)
     started = time.perf_counter()
     fly = fly_central if options.law == CENTRAL else fly_lockstep
-    record = fly(scenario, formation, samples)
+    with no_collector():
+        record = fly(scenario, formation, samples)
     took_s = time.perf_counter() - started
     if options.csv:
         write_csv(record, options.csv)

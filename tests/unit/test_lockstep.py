@@ -1,6 +1,7 @@
 """The simulators: agents in lockstep, one central computer, and that they agree."""
 
 import csv
+import gc
 import hashlib
 import itertools
 from pathlib import Path
@@ -8,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agents.settings import hand_settings
 from agents.vehicles.world.setup import referee_rules
-from deploy.lockstep.central import fly_central
-from deploy.lockstep.hand_track import relayed
+from deploy.lockstep.central import Flock, fly_central
+from deploy.lockstep.collector import no_collector
+from deploy.lockstep.hand_track import map_samples, relayed
 from deploy.lockstep.lockstep import Lockstep, fly_lockstep
 from deploy.lockstep.record import Record, judge, write_csv
-from deploy.lockstep.start import start_flyers
+from deploy.lockstep.start import rest_places, start_flyers
 from shared.config import load_scenario
 from shared.formation import build_formation
 from shared.messages import HandSample, Mode, Wish
@@ -196,3 +199,32 @@ def test_a_hand_that_wishes_hold_moves_nobody() -> None:
     hand = samples_of(positions, np.tile([0.5, 0.0, 0.0], (60, 1)), Wish.HOLD)
     record = fly_lockstep(scenario, build_formation(scenario), hand)
     assert np.ptp(record.goal, axis=0).max() < 1e-6
+
+
+def test_what_is_rounded_stays_small_in_a_formation_with_room() -> None:
+    """One whose drones keep off each other all the time is chaotic instead (docs/performance.md)."""
+    scenario = load_scenario("grid", ["formation.n=25"])
+    formation = build_formation(scenario)
+    hand = map_samples(stroke(np.pi / 3, 1.0, 0.9, after=1.0), hand_settings(scenario, formation))
+    seen = []
+    for moved in (0.0, 1e-13):
+        (x, y, z), *others = rest_places(formation, hand[0][1])
+        flock = Flock(scenario, formation, [(x + moved, y, z), *others])
+        for sample, mapped in hand:
+            flock.advance(sample, mapped)
+        seen.append(np.array([member.setpoint for member in flock.members]))
+    assert np.abs(seen[0] - seen[1]).max() < 1e-10
+
+
+def test_nothing_that_a_flock_makes_needs_a_collector() -> None:
+    scenario = load_scenario("grid", ["formation.n=25"])
+    formation = build_formation(scenario)
+    hand = map_samples(stroke(np.pi / 3, 1.0, 0.9, after=1.0), hand_settings(scenario, formation))
+    flock = Flock(scenario, formation, rest_places(formation, hand[0][1]))
+    gc.collect()
+    with no_collector():
+        assert not gc.isenabled()
+        for sample, mapped in hand:
+            flock.advance(sample, mapped)
+        assert gc.collect() == 0
+    assert gc.isenabled()
