@@ -27,6 +27,9 @@ from shared.senses import Senses
 from shared.topics import DRONE_STATE, HAND
 from shared.transport import Arrival
 
+GLOVE_THERE = "glove_there"
+"""Metric of the bridge's status: 1 while patterns can be felt, else 0."""
+
 
 @frozen(kw_only=True)
 class Step:

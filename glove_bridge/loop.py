@@ -4,7 +4,7 @@ import logging
 import threading
 from collections import deque
 
-from glove_bridge.bridge import Bridge, Step
+from glove_bridge.bridge import GLOVE_THERE, Bridge, Step
 from glove_bridge.gloves.base import Glove, Outcome
 from shared.clock import NS_PER_S, Clock
 from shared.codec import encode
@@ -18,9 +18,6 @@ LONGEST_WAIT = 0.05
 
 REST = 0.004
 """Shortest time between two steps, s: the states of one tick of the swarm are worth few steps, not one each."""
-
-GLOVE_THERE = "glove_there"
-"""Metric of the bridge's status: 1 while patterns can be felt, else 0."""
 
 _STATE_PERIOD_NS = round(NS_PER_S / FORMATION_STATE.rate_hz)
 _log = logging.getLogger("bridge")

@@ -65,6 +65,7 @@ def _await(glove: Glove, uri: str | None) -> None:
     deadline = time.monotonic() + ANSWER_S
     while not glove.connected:
         if time.monotonic() > deadline:
-            fault = f": {glove.link.session.fault}" if isinstance(glove, SerialGlove) else ""
-            raise DeviceError(f"{uri or 'glove'}: does not answer{fault}; see docs/glove.md, first evening")
+            raise DeviceError(
+                f"{uri or 'glove'}: cannot be used: {glove.fault}; see docs/glove.md, first evening"
+            )
         time.sleep(0.01)

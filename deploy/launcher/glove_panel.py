@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Mapping
 
+from glove_bridge.bridge import GLOVE_THERE
 from glove_bridge.gloves.terminal import draw
-from glove_bridge.loop import GLOVE_THERE
 from glove_bridge.patterns import CUES, load_patterns
 from glove_bridge.patterns.pattern import Frame, Pattern
 from shared.clock import Clock, system_clock

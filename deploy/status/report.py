@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable
 
 from attrs import frozen
 
+from glove_bridge.bridge import GLOVE_THERE
 from shared.conditions import conditions
 from shared.messages import DroneState, Flag, ProcessStatus
 from shared.net.audit import LINKED, REFUSED
@@ -101,6 +102,8 @@ def judge(token: str, heard: Heard) -> Row:
         problems.append("says nothing")
     elif heard.status.state not in WELL_STATES:
         problems.append(plain(heard.status.state))
+    if heard.status is not None and heard.status.metrics.get(GLOVE_THERE) == 0.0:
+        problems.append("no glove that can be felt")
     if token.startswith(f"{DRONE}/") and heard.state is None:
         problems.append("sends no state")
     if heard.state is not None:

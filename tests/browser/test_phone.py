@@ -146,6 +146,23 @@ def test_a_second_finger_presses_a_button_while_the_first_one_steers(
     fingers.lift(0)
 
 
+WAKE = """
+    window.awake = 0;
+    const lock = () => ({ released: false, release: async () => { window.awake -= 1; } });
+    Object.defineProperty(navigator, "wakeLock", {
+        value: { request: async (what) => { window.awake += what === "screen"; return lock(); } },
+    });
+"""
+
+
+def test_the_screen_stays_on_while_the_page_is_the_hand(open_pilot: OpenPilot) -> None:
+    pilot = phone(open_pilot, init_script=WAKE)
+    pilot.until(lambda: pilot.page.is_enabled("#take"))
+    for awake in (1, 0):
+        pilot.page.evaluate("document.getElementById('take').click()")
+        pilot.until(lambda awake=awake: pilot.page.evaluate("window.awake") == awake)  # type: ignore[misc]
+
+
 UNFELT = """async (event) => {
     const { GlovePanel } = await import("./panels/glove.js");
     const panel = new GlovePanel();

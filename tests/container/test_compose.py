@@ -1,7 +1,10 @@
 """The demo in containers: up, fly, lose one, heal, and down to nothing."""
 
+import re
+
 import pytest
 
+from observer.console import PORT as CONSOLE_PORT
 from shared.config import load_scenario
 from shared.messages import Mode
 from shared.scenario import Scenario
@@ -14,6 +17,7 @@ from tests.container.project import (
     running,
     scenario_seen_from_outside,
 )
+from tests.integration.console_page import open_page
 from tests.integration.recorder import START_S, WORLD, Recorder
 
 pytestmark = [pytest.mark.container, pytest.mark.timeout(900)]
@@ -95,6 +99,29 @@ def check_that_the_hand_is_apart(project: Project) -> None:
         address = (project.address("drone-1", network), PORT)
         dial = f"import socket; socket.create_connection({address}, 2)"
         assert succeeds("docker", "exec", bridge, "python", "-c", dial) is answers, network
+
+
+@pytest.mark.usefixtures("image")
+def test_a_page_flies_the_containers_and_nobody_else_reaches_its_socket(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("HAND", "pointer://")
+    project = Project(compose_commands()[-1], "swarmtouch-test", [COMPOSE_FILE])
+    with running(project), Recorder(scenario_seen_from_outside(project)) as recorder:
+        recorder.until(lambda: recorder.all_in(Mode.GROUND), START_S)
+        told = re.search(r"\?token=(\S+)", project.logs())
+        assert told
+        with open_page(CONSOLE_PORT, token=told[1]) as page:
+            page.say(type="take")
+            page.point(*page.newest["scene"]["hand"]["start"])
+            page.say(type="wish", wish="FLY")
+            recorder.until(lambda: recorder.all_in(Mode.FOLLOW), START_S)
+        socket = "/run/swarmtouch/swarmtouch/pointer.sock"
+        for service, there in (("relay", True), ("console", True), ("drone-1", False)):
+            assert succeeds("docker", "exec", project.container(service), "test", "-S", socket) is there
+        mode = docker("exec", project.container("relay"), "stat", "--format", "%a %U", socket)
+        assert mode.split() == ["600", "swarmtouch"]
+    assert project.leftovers() == ""
 
 
 @pytest.mark.usefixtures("image")

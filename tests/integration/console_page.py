@@ -92,12 +92,18 @@ class Page:
 
 
 @contextlib.contextmanager
-def open_page(port: int, limit_s: float = OPEN_S) -> Iterator[Page]:
-    """Opens a page as soon as the console lets it in, trying again as a browser does; closes it for sure."""
+def open_page(port: int, limit_s: float = OPEN_S, token: str = "") -> Iterator[Page]:
+    """Opens a page as soon as the console lets it in, trying again as a browser does; closes it for sure.
+
+    Args:
+        port: Of the console.
+        limit_s: How long to try, s.
+        token: What the console wants to know; a browser has it in a cookie.
+    """
     deadline = time.monotonic() + limit_s
     while True:
         with contextlib.ExitStack() as stack:
-            page = _try_page(port, stack)
+            page = _try_page(port, stack, {"Cookie": f"swarmtouch-{port}={token}"} if token else {})
             if page is not None:
                 yield page
                 return
@@ -105,10 +111,11 @@ def open_page(port: int, limit_s: float = OPEN_S) -> Iterator[Page]:
         time.sleep(0.05)
 
 
-def _try_page(port: int, stack: contextlib.ExitStack) -> Page | None:
+def _try_page(port: int, stack: contextlib.ExitStack, headers: dict[str, str]) -> Page | None:
     """Opens a page that lives as long as the stack; None if it is not let in, or told to go again."""
     try:
-        connection = stack.enter_context(connect(f"ws://127.0.0.1:{port}/ws", compression=None))
+        address = f"ws://127.0.0.1:{port}/ws"
+        connection = stack.enter_context(connect(address, compression=None, additional_headers=headers))
     except (OSError, WebSocketException, EOFError):
         return None
     page = stack.enter_context(Page(connection))

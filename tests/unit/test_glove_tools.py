@@ -1,9 +1,13 @@
 """`swarmtouch glove ...` on a simulated device: the first evening with a soldered glove."""
 
 import builtins
+import os
+import pty
 import re
 import stat
+import threading
 import time
+import tty
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -112,13 +116,38 @@ def test_who_does_not_answer_is_named(
 ) -> None:
     monkeypatch.setattr(device, "ANSWER_S", 0.3)
     assert main(["glove", "hello", "--glove", f"serial://{tmp_path}/nothing"]) == 1
-    assert "nothing: does not answer: " in (said := capsys.readouterr().err)
+    assert "nothing: cannot be used: " in (said := capsys.readouterr().err)
     assert "No such file" in said
     with simulated_glove(tmp_path / "port", PROTOCOL + 1) as other:
         assert main(["glove", "hello", "--glove", uri(other)]) == 1
     assert f"speaks protocol {PROTOCOL + 1}, not {PROTOCOL}; flash it" in capsys.readouterr().err
     assert main(["glove", "hello", "--glove", "terminal://"]) == 2
     assert "not a glove on a serial line" in capsys.readouterr().err
+
+
+def test_a_port_of_something_else_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(device, "ANSWER_S", 2.0)
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    (tmp_path / "gps").symlink_to(os.ttyname(slave))
+    talking = threading.Event()
+
+    def talk() -> None:
+        while not talking.wait(0.05):
+            os.write(master, b"$GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03*76\r\n")
+
+    thread = threading.Thread(target=talk)
+    thread.start()
+    try:
+        assert main(["glove", "hello", "--glove", f"serial://{tmp_path}/gps"]) == 1
+    finally:
+        talking.set()
+        thread.join()
+        os.close(master)
+        os.close(slave)
+    assert "answers, but not as a glove: wrong port or baud?" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

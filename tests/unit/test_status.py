@@ -4,6 +4,7 @@ import json
 import re
 from io import StringIO
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 from rich.console import Console
@@ -11,6 +12,7 @@ from rich.console import Console
 from deploy.cli import main
 from deploy.status.report import Heard, expected_processes, judge, rows_of
 from deploy.status.show import audit_table, status_json, status_table
+from glove_bridge.bridge import GLOVE_THERE
 from shared.messages import NO_FLAGS, DroneState, Flag, Mode, ProcessStatus
 from shared.net.audit import Audit
 
@@ -59,6 +61,12 @@ def test_a_drone_is_judged_by_presence_health_and_flags(heard: Heard, problems: 
     row = judge("drone/1", heard)
     assert row.problems == problems
     assert row.well is not bool(problems)
+
+
+def test_a_bridge_without_a_glove_says_so() -> None:
+    for there, problems in ((1.0, ()), (0.0, ("no glove that can be felt",))):
+        health = msgspec.structs.replace(status(), role="bridge", id=0, metrics={GLOVE_THERE: there})
+        assert judge("bridge/0", Heard(present=True, status=health)).problems == problems
 
 
 def test_everybody_expected_and_everybody_heard_gets_a_row() -> None:

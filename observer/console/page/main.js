@@ -2,6 +2,7 @@
 
 import { Connection } from "./connection.js";
 import { part, write } from "./dom.js";
+import { Awake } from "./hand/awake.js";
 import { Drag } from "./hand/drag.js";
 import { Gamepads } from "./hand/gamepad.js";
 import { Keys } from "./hand/keys.js";
@@ -35,6 +36,7 @@ const control = new ControlPanel(model, (message) => connection.send(message));
 const keys = new Keys({ take: () => control.reach(), stop: () => control.order("STOP") });
 const gamepads = new Gamepads((wish) => control.order(wish));
 const tilt = new Tilt();
+const awake = new Awake();
 
 /** @param {any} message from the console, see docs/console.md */
 function receive(message) {
@@ -76,6 +78,9 @@ function controlChanged(message) {
     steering.begin(model.hand, model.snapshot?.hand?.yaw ?? 0);
   } else if (!model.mine) {
     steering.end();
+  }
+  if (model.mine !== had) {
+    awake.keep(model.mine);
   }
   control.show(connection.open);
 }
