@@ -112,8 +112,12 @@ def hash_of(content: bytes) -> str:
 
 def hash_of_file(file: Path) -> str:
     """Returns the hash of a file's content."""
-    with open(file, "rb") as opened:
-        return hash_of(opened.read())
+    # Without Python's buffers: a start looks at some eighty files.
+    opened = os.open(file, os.O_RDONLY)
+    try:
+        return hash_of(os.read(opened, os.fstat(opened).st_size + 1))
+    finally:
+        os.close(opened)
 
 
 def manifest_file(folder: Path) -> Path:

@@ -23,7 +23,8 @@ def main(folder: Path, library: str, flags: list[str], files: list[str]) -> None
     group = library.removesuffix("__mypyc")
     # What these modules import may itself import what is not installed here; `make lint` checks all types.
     options = ["--cache-dir", str(folder / "mypy"), "--config-file", "", "--ignore-missing-imports"]
-    extensions = mypycify([*options, *files], group_name=group, target_dir=str(folder / "c"))
+    # No line numbers of generated C: tracebacks have ours, and profilers the names of functions.
+    extensions = mypycify([*options, *files], group_name=group, target_dir=str(folder / "c"), debug_level="0")
     for extension in extensions:
         extension.extra_compile_args += flags
     command = build_ext(Distribution({"name": group, "ext_modules": extensions}))
