@@ -71,16 +71,29 @@ class Pilot:
         self.page.get_by_role("button", name=name).click()
 
     def take_off(self) -> None:
-        """Flies, once every drone is heard and nobody holds the hand; waits until all follow."""
+        """Flies, once every drone is heard and nobody holds the hand; waits until all follow.
+
+        As a person does it presses again if the hand is lost on the way: a browser that gets no time for 0.6 s
+        falls silent.
+        """
         self.until(lambda: not any(word in self.text("#swarm-state") for word in ("silent", "connect")))
         self.until(lambda: self.text("#take") == "Take the hand")
-        self.page.click("#fly")
-        self.until_mode("FOLLOW")
+
+        def follows() -> bool:
+            if self.text("#take") == "Take the hand":
+                self.page.click("#fly")
+            return self.all_in("FOLLOW")
+
+        self.until(follows)
 
     def until_mode(self, mode: str) -> None:
         """Waits until the page is told that every drone is in a mode."""
+        self.until(lambda: self.all_in(mode))
+
+    def all_in(self, mode: str) -> bool:
+        """Says whether the page has been told that every drone is in a mode."""
         count = len(self.told("scene")["drones"])
-        self.until(lambda: [d["mode"] for d in self.told("snapshot")["drones"]] == [mode] * count)
+        return [d["mode"] for d in self.told("snapshot")["drones"]] == [mode] * count
 
     def hand(self) -> list[float]:
         """Returns the mapped hand as the page is told."""

@@ -52,7 +52,11 @@ class Fingers:
         self._down: dict[int, Point] = {}
 
     def put(self, finger: int, x: float, y: float) -> None:
-        self._down[finger] = (x, y)
+        self.put_all({finger: (x, y)})
+
+    def put_all(self, fingers: dict[int, Point]) -> None:
+        """Puts fingers down one right after the other, however busy the machine is."""
+        self._down |= fingers
         self._send("touchStart")
 
     def move(self, finger: int, x: float, y: float) -> None:
@@ -60,12 +64,12 @@ class Fingers:
         self._send("touchMove")
 
     def lift(self, finger: int) -> None:
-        """Chromium takes a point that is no longer listed for a finger that was lifted."""
-        del self._down[finger]
-        self._send("touchMove" if self._down else "touchEnd")
+        """Chromium wants the fingers that are lifted listed, and lifts all if none is."""
+        self._send("touchEnd", {finger: self._down.pop(finger)})
 
-    def _send(self, kind: str) -> None:
-        points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in self._down.items()]
+    def _send(self, kind: str, fingers: dict[int, Point] | None = None) -> None:
+        listed = self._down if fingers is None else fingers
+        points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in listed.items()]
         self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
 
@@ -100,9 +104,17 @@ def steady(pilot: Pilot, x: float, y: float) -> bool:
 
 
 def rest(pilot: Pilot) -> tuple[float, float, float]:
-    """Waits until the hand rests; returns where."""
+    """Waits until the hand rests, and the drones, which swing after a take-off; returns where the hand is."""
+
+    def is_resting() -> bool:
+        seen = pilot.told("snapshot")
+        bodies = [drone["velocity"] for drone in seen["drones"]]
+        return max(map(abs, seen["hand"]["velocity"])) < 0.01 and all(
+            max(map(abs, velocity)) < 0.05 for velocity in bodies
+        )
+
     pilot.page.wait_for_timeout(600)
-    pilot.until(lambda: max(map(abs, pilot.told("snapshot")["hand"]["velocity"])) < 0.01)
+    pilot.until(is_resting)
     x, y, z = pilot.hand()
     return x, y, z
 
@@ -110,8 +122,7 @@ def rest(pilot: Pilot) -> tuple[float, float, float]:
 def test_two_fingers_anywhere_lift_the_hand_where_it_is(flying: Pilot, flight: ConsoleFlight) -> None:
     x, y, z = rest(flying)
     fingers, (px, py) = Fingers(flying), flying.spot([x + 1.0, y, 0.0])
-    fingers.put(0, px - 60, py)
-    fingers.put(1, px + 60, py)
+    fingers.put_all({0: (px - 60, py), 1: (px + 60, py)})
     lifted = drone_moved(flight, 2, 0.12)
     for up in range(5, 65, 5):
         fingers.move(0, px - 60, py - up)
@@ -144,6 +155,43 @@ def test_a_second_finger_presses_a_button_while_the_first_one_steers(
     fingers.move(1, box["x"] + box["width"] / 2, box["y"] - 200)
     fingers.lift(1)
     fingers.lift(0)
+
+
+CALLED = """async () => {
+    const { Steering } = await import("./hand/steering.js");
+    const steering = new Steering();
+    steering.limit({ low: [-2, -2, 0], high: [2, 2, 2], max_speed: 1 });
+    steering.lift(0.5); // a wheel takes no hand
+    steering.goTo(1, -1);
+    steering.lift(0.2);
+    steering.lift(0.1);
+    steering.begin([0, 0, 1], 0);
+    const { point } = steering;
+    steering.end();
+    steering.begin([0, 0, 1], 0);
+    return [...point, ...steering.point];
+}"""
+WATCHED = """async () => {
+    const { Drag } = await import("./hand/drag.js");
+    const [surface, called] = [document.createElement("div"), []];
+    const camera = { toScreen: () => [0, 0], toWorld: () => [1, 1] };
+    new Drag(surface, {
+        camera: () => camera, hand: () => [0, 0, 1], wanted: () => [0, 0, 1], take: () => false,
+        goTo: (...where) => called.push(where), lift: (metres) => called.push(metres),
+    });
+    for (const kind of ["pointerdown", "pointermove", "pointerup"]) {
+        surface.dispatchEvent(new PointerEvent(kind, { pointerId: 1, button: 0 }));
+    }
+    return called;
+}"""
+
+
+def test_a_drag_counts_from_where_it_took_the_hand_and_only_then(open_pilot: OpenPilot) -> None:
+    pilot = open_pilot()
+    assert pilot.page.evaluate(CALLED) == pytest.approx([1.0, -1.0, 1.3, 0.0, 0.0, 1.0])
+    assert pilot.page.evaluate(WATCHED) == [], (
+        "who watches and drags calls nobody, not even once it is given the hand"
+    )
 
 
 WAKE = """

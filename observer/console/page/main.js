@@ -125,7 +125,11 @@ function steer(seconds) {
   steering.advance(push, Math.min(seconds, LONGEST_FRAME_S));
 }
 
-/** Sends the wanted hand when it has moved, and again and again while it rests. @param {number} now ms */
+/**
+ * Sends the wanted hand when it has moved, and again and again while it rests; by a clock as well, as a browser that
+ * is slow to show frames is no hand that has let go.
+ * @param {number} now ms
+ */
 function tell(now) {
   const message = steering.message();
   const text = JSON.stringify(message);
@@ -184,3 +188,4 @@ function letGo() {
 
 connection.connect();
 requestAnimationFrame(frame);
+setInterval(() => tell(performance.now()), REPEAT_MS / 2);

@@ -40,14 +40,11 @@ export class Drag {
 
   /** @param {PointerEvent} event */
   #press(event) {
-    if (event.button !== 0) {
+    if (event.button !== 0 || !this.#reach.take()) {
       return;
     }
     this.#surface.setPointerCapture(event.pointerId);
     this.#pointers.set(event.pointerId, place(event));
-    if (!this.#reach.take()) {
-      return;
-    }
     if (this.#pointers.size === 1) {
       const offset = this.#toHand(place(event), this.#reach.hand());
       this.#offset = Math.hypot(offset.x, offset.y) < GRAB_PX ? offset : { x: 0, y: 0 };

@@ -14,6 +14,8 @@ export class Steering {
   #yaw = 0;
   /** @type {[number, number] | null} where a drag calls the hand before this page has it */
   #called = null;
+  /** How far that drag has lifted it meanwhile, m. */
+  #lifted = 0;
 
   /** @param {{low: Vector, high: Vector, max_speed: number}} hand limits of the scene */
   limit({ low, high, max_speed }) {
@@ -30,12 +32,19 @@ export class Steering {
   begin([x, y, z], yaw) {
     this.#yaw = yaw;
     [x, y] = this.#called ?? [x, y];
-    this.point = this.#inside([x, y, z]);
+    this.point = this.#inside([x, y, z + this.#lifted]);
+    this.#forget();
   }
 
   /** Ends: this page holds the hand no longer. */
   end() {
-    this.point = this.#called = null;
+    this.point = null;
+    this.#forget();
+  }
+
+  #forget() {
+    this.#called = null;
+    this.#lifted = 0;
   }
 
   /**
@@ -55,6 +64,8 @@ export class Steering {
   lift(metres) {
     if (this.point) {
       this.point = this.#inside([this.point[0], this.point[1], this.point[2] + metres]);
+    } else if (this.#called) {
+      this.#lifted += metres;
     }
   }
 
