@@ -3,18 +3,20 @@
 import argparse
 import gc
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 from agents.agent import Agent
-from agents.loop import run
+from agents.loop import Mouth, run
+from agents.near_links import NearLinks
 from agents.settings import agent_settings
 from agents.vehicles import open_vehicle
-from shared.bus import join
+from shared.bus import join, reach
 from shared.clock import system_clock
 from shared.errors import SwarmTouchError
 from shared.nodes import drone_node
 from shared.process import StatusReporter, add_process_arguments, explain, prepare_process, tell_form
 from shared.scenario_check.checked import check_drone, open_checked
-from shared.topics import DRONE_STATE
+from shared.topics import DRONE_STATE, PLACES
 from shared.transport import Inbox
 from shared.vehicles import vehicle_settings
 
@@ -37,11 +39,18 @@ def main() -> int:
     with bus:
         for key in agent.senses.keys:
             bus.subscribe(key, inbox)
-        publish = bus.publisher(DRONE_STATE, id=args.id)
+        mouth = Mouth(bus.publisher(DRONE_STATE, id=args.id), bus.publisher(PLACES, id=args.id))
+        own = drone_node(args.id)
+        links = NearLinks(
+            lambda other: reach(scenario, formation, own, drone_node(other)),
+            inbox,
+            clock,
+            ThreadPoolExecutor(1),
+        )
         # What starting up has left never dies: the collector need not look through it in flight.
         gc.freeze()
         status = StatusReporter(bus, "drone", args.id, clock, tell_form())
-        run(agent, vehicle, inbox, publish, status, clock, stopping)
+        run(agent, vehicle, inbox, mouth, links, status, clock, stopping)
         vehicle.close()
     return 0
 

@@ -11,15 +11,16 @@ from agents.control.steering import Bystander
 from agents.control.step import Inputs, Settings, State, start, step
 from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
+from agents.vicinity import Vicinity
 from shared.clock import NS_PER_S
 from shared.fence import bodies_of
 from shared.formation import Formation
-from shared.messages import NO_HAND, DroneState, Flag, HandSample, Heard
+from shared.messages import NO_HAND, DroneState, Flag, HandSample, Heard, Mode, Places, Seen
 from shared.net.keyring import hand_verifier
-from shared.nodes import neighbours
+from shared.nodes import neighbours, tellers
 from shared.scenario import Scenario
 from shared.senses import Sensed, Senses
-from shared.topics import DRONE_STATE, HAND
+from shared.topics import DRONE_STATE, HAND, PLACES
 from shared.transport import Arrival
 from shared.vehicles import vehicle_settings
 
@@ -32,8 +33,10 @@ SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
 """... from this distance on, growing at this rate, up to this, m and m/s."""
 DOUBTED_FOR = 1.0
 """That somebody says what cannot be believed is told for this long, s."""
+_PLACES_PERIOD_NS = round(NS_PER_S / PLACES.rate_hz)
 _DOUBTED_NS = round(DOUBTED_FOR * NS_PER_S)
 _SILENT_NS = round(SILENT_AFTER * NS_PER_S)
+_NOBODY: frozenset[int] = frozenset()
 
 
 class Agent:
@@ -45,20 +48,36 @@ class Agent:
         drone: Own number.
         settings: Of this drone, see `agents.settings`.
         epoch: Start of this process, ns.
+
+    Attributes:
+        senses: What it has heard.
+        tellers: Whom it hears tell of others.
+        steps: How many it has made.
     """
 
     def __init__(
         self, scenario: Scenario, formation: Formation, drone: int, settings: Settings, epoch: int
     ) -> None:
+        always = neighbours(scenario, formation, drone)
+        everybody = [other for other in formation.ids if other != drone]
+        self.tellers = frozenset(tellers(scenario, formation, drone))
         self.senses = Senses(
-            neighbours(scenario, formation, drone), hand_verifier(scenario.net), bodies_of(scenario, formation)
+            always,
+            hand_verifier(scenario.net),
+            bodies_of(scenario, formation),
+            aside=everybody,
+            tellers=self.tellers,
         )
         self.steps = 0
         self._drone = drone
         self._epoch = epoch
         self._references = {other: DRONE_STATE.key(id=other) for other in formation.references(drone)}
         self._kin = {kin.drone: DRONE_STATE.key(id=kin.drone) for kin in settings.kin}
-        self._memories = memories(scenario, neighbours(scenario, formation, drone))
+        self._memories = memories(scenario, everybody)
+        self._listened = {other: self._memories[other] for other in always}
+        self._vicinity = Vicinity(always, self._memories) if len(always) < len(everybody) else None
+        self._places: Places | None = None
+        self._places_due_ns = self._told = 0
         self._links = [link.name for link in settings.row.links]
         self._settings = settings
         self._rule = step_rule(scenario.rates)
@@ -66,6 +85,15 @@ class Agent:
         self._state: State | None = None
         self._used: dict[str, Sensed[HandSample] | Sensed[DroneState]] = {}
         self._last_step_ns = 0
+
+    @property
+    def near(self) -> frozenset[int]:
+        """Whom to hear directly for a while, beside those whom this drone always hears."""
+        return _NOBODY if self._vicinity is None else self._vicinity.near
+
+    def hears(self, drone: int) -> bool:
+        """Says whether this drone hears another one, now or always."""
+        return drone in self._listened or drone in self.near
 
     def receive(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Takes in what the bus delivered."""
@@ -90,6 +118,7 @@ class Agent:
         if self._state is None:
             self._state = start(pose.position, self._settings, airborne=pose.airborne)
         dt = (now_ns - self._last_step_ns) / NS_PER_S if self.steps else self._nominal_dt
+        self._look_afar(now_ns, pose, self._state.mode.mode)
         company = self._look_around(now_ns)
         inputs = self._inputs(now_ns, pose, pose_age, company)
         self._state, output = step(self._state, inputs, self._settings, dt)
@@ -142,13 +171,41 @@ class Agent:
     def _is_fresh(self, key: str, sensed: Sensed[HandSample] | Sensed[DroneState]) -> bool:
         return self._used.get(key) is not sensed
 
+    def places(self) -> Places | None:
+        """Returns what is to be told of everybody after a step, once.
+
+        In a swarm in which everybody hears everybody nobody is told of others.
+        """
+        places, self._places = self._places, None
+        return places
+
+    def _look_afar(self, now_ns: int, pose: Pose, mode: Mode) -> None:
+        """Takes in what was told of others, decides anew whom to listen to, and what to tell."""
+        vicinity, senses = self._vicinity, self.senses
+        if vicinity is None or now_ns < self._places_due_ns:
+            return
+        self._places_due_ns = now_ns + _PLACES_PERIOD_NS
+        own = Seen(self._drone, self._epoch, self.steps, pose.position, pose.velocity, mode, 0.0)
+        seen = vicinity.look(own, senses.drones, senses.places, now_ns)
+        self._places = Places(epoch=self._epoch, seq=self._told, stamp_ns=now_ns, id=self._drone, seen=seen)
+        self._told += 1
+
     def _look_around(self, now_ns: int) -> Company:
-        senses = self.senses
+        senses, vicinity, listened = self.senses, self._vicinity, self._listened
+        if vicinity is not None and vicinity.near:
+            counted = vicinity.counted(senses.drones, now_ns)
+            listened = listened | {other: self._memories[other] for other in counted}
         doubted: dict[int, int] = {}
         if senses.doubted_ns:
-            keys = {drone: DRONE_STATE.key(id=drone) for drone in self._memories}
+            keys = {drone: DRONE_STATE.key(id=drone) for drone in listened}
             doubted = {drone: senses.doubted_ns[key] for drone, key in keys.items() if key in senses.doubted_ns}
-        return look_around(self._drone, self._memories, senses.drones, doubted, now_ns)
+        if vicinity is None:
+            return look_around(self._drone, listened, senses.drones, doubted, now_ns)
+        elsewhere = vicinity.known(now_ns)
+        company = look_around(self._drone, listened, senses.drones, doubted, now_ns, elsewhere)
+        # Whoever has just come near is kept away from as it was told, until it is heard.
+        coming = [elsewhere(drone) for drone in vicinity.near if drone not in listened]
+        return company._replace(missing=[*company.missing, *(seen for seen in coming if seen is not None)])
 
     def _inputs(self, now_ns: int, pose: Pose, pose_age: float, company: Company) -> Inputs:
         hand, heard = self.senses.hand, self.senses.drones

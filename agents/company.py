@@ -10,7 +10,7 @@ Two drones keep apart only while one of them knows where the other is. So:
 * Nobody takes off or follows before it has heard everybody, or has been told where they were seen last.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import NamedTuple
 
 from agents.control.modes import GROUND, HAND_LAND, STOP, TOUCHDOWN
@@ -21,6 +21,8 @@ from shared.topics import DRONE_STATE
 
 UNHEARD_AFTER = DRONE_STATE.stale_s
 """A drone that has been silent for longer is not heard, s."""
+TOLD_WITHIN = 2.0
+"""The word of somebody who is heard goes round within this time, s."""
 SETTLING = 5.0
 """A landing takes longer than its way at the landing speed by at most this, s."""
 FALL = 2.0
@@ -91,6 +93,7 @@ def look_around(
     known: Mapping[int, Sensed[DroneState]],
     doubted_ns: Mapping[int, int],
     now_ns: int,
+    elsewhere: Callable[[int], Seen | None] | None = None,
 ) -> Company:
     """Sorts the others by what is known of them.
 
@@ -100,6 +103,7 @@ def look_around(
         known: The newest state of each that was ever heard.
         doubted_ns: When something that was not believed last came from them (own clock, ns).
         now_ns: Own clock.
+        elsewhere: Returns as what others say that they saw one, where not everybody hears everybody.
     """
     heard: list[Sensed[DroneState]] = []
     silent: list[int] = []
@@ -113,11 +117,16 @@ def look_around(
     deaf = frozenset(report.id for report in reports if drone in report.unheard) if reports else _NOBODY
     if not silent:
         return Company(heard, [], (), (), (), deaf, missed=bool(deaf), alone=False)
-    seen = _seen(silent, known, reports, now_ns)
-    missing = [each for each in seen if _may_fly(each, memories[each.id], doubted_ns.get(each.id), now_ns)]
+    told = {} if elsewhere is None else {other: elsewhere(other) for other in silent}
+    seen = _seen(silent, known, reports, told, now_ns)
+    missing = [each for each in seen if may_fly(each, memories[each.id], doubted_ns.get(each.id), now_ns)]
     awaited = tuple(set(silent) - {each.id for each in seen})
     cut_off = not heard and bool(missing or awaited)
-    broken = any(each.id < drone and _is_heard_elsewhere(each.id, heard) for each in missing)
+    lower = [each.id for each in missing if each.id < drone]
+    if elsewhere is None:
+        broken = any(_is_heard_elsewhere(other, heard) for other in lower)
+    else:
+        broken = any(_is_seen_elsewhere(known.get(other), told.get(other), now_ns) for other in lower)
     return Company(
         heard=heard,
         missing=missing,
@@ -134,16 +143,23 @@ def _seen(
     silent: Iterable[int],
     known: Mapping[int, Sensed[DroneState]],
     reports: Collection[DroneState],
+    told: Mapping[int, Seen | None],
     now_ns: int,
 ) -> list[Seen]:
     """Returns as what the silent ones were seen last: by this drone itself, or else by others."""
     found = []
     for other in silent:
-        sensed = known.get(other)
+        sensed, word = known.get(other), told.get(other)
         seen = _told(other, reports) if sensed is None else _own(sensed, now_ns)
+        if word is not None and (seen is None or _order(word) > _order(seen)):
+            seen = word
         if seen is not None:
             found.append(seen)
     return found
+
+
+def _order(seen: Seen) -> tuple[int, int]:
+    return (seen.epoch, seen.seq)
 
 
 def _own(sensed: Sensed[DroneState], now_ns: int) -> Seen:
@@ -158,11 +174,27 @@ def _told(other: int, reports: Iterable[DroneState]) -> Seen | None:
     return max(seen, key=lambda each: (each.epoch, each.seq, -each.age), default=None)
 
 
-def _may_fly(seen: Seen, memory: Memory, doubted_ns: int | None, now_ns: int) -> bool:
+def may_fly(seen: Seen, memory: Memory, doubted_ns: int | None, now_ns: int) -> bool:
+    """Says whether one that is not heard may be in the air.
+
+    Args:
+        seen: As what it was seen last.
+        memory: How long its body may stay there.
+        doubted_ns: When something that was not believed last came from it (own clock, ns).
+        now_ns: Own clock.
+    """
     # While somebody speaks for it, be it what cannot be believed, it may be anywhere but forgotten.
     age = seen.age if doubted_ns is None else min(seen.age, (now_ns - doubted_ns) / NS_PER_S)
-    return age <= memory.lasts(seen.mode, seen.position[2])
+    return age < memory.lasts(seen.mode, seen.position[2])
 
 
 def _is_heard_elsewhere(other: int, heard: Iterable[Sensed[DroneState]]) -> bool:
+    """Says whether one that is silent is heard by somebody else, where everybody listens to everybody."""
     return any(other not in sensed.message.unheard for sensed in heard)
+
+
+def _is_seen_elsewhere(own: Sensed[DroneState] | None, told: Seen | None, now_ns: int) -> bool:
+    """The same where not everybody does: somebody has seen it since this drone heard it last."""
+    if told is None or told.age > TOLD_WITHIN:
+        return False
+    return own is None or told.age < own.age(now_ns) - UNHEARD_AFTER

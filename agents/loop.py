@@ -5,9 +5,11 @@ A turn is made by the thread that brings the last input of a step, see `agents.t
 
 import logging
 import threading
+from typing import NamedTuple
 
 from agents.agent import Agent
 from agents.control.modes import POSE_LOST
+from agents.near_links import NearLinks
 from agents.turns import Turns
 from agents.vehicles.base import Pose, Vehicle
 from shared.clock import NS_PER_S, Clock
@@ -48,6 +50,18 @@ class PoseWatch:
         return pose, (now_ns - self._seen_ns) / NS_PER_S
 
 
+class Mouth(NamedTuple):
+    """Where an agent publishes.
+
+    Attributes:
+        state: Its own state.
+        places: Where it saw whom last.
+    """
+
+    state: Publish
+    places: Publish
+
+
 class Pilot:
     """Makes the turns of an agent's loop: receive -> compute -> publish.
 
@@ -55,13 +69,13 @@ class Pilot:
         agent: Its brain.
         vehicle: Its body.
         inbox: Filled by the bus with everything in `agent.senses.keys`.
-        publish: Sends its state.
+        mouth: Sends what it says.
         clock: The process's clock.
     """
 
-    def __init__(self, agent: Agent, vehicle: Vehicle, inbox: Inbox, publish: Publish, clock: Clock) -> None:
+    def __init__(self, agent: Agent, vehicle: Vehicle, inbox: Inbox, mouth: Mouth, clock: Clock) -> None:
         self._agent, self._vehicle, self._inbox = agent, vehicle, inbox
-        self._publish, self._clock = publish, clock
+        self._mouth, self._clock = mouth, clock
         self._poses = PoseWatch(vehicle)
         self._mode: Mode | None = None
         self._complain_ns = 0
@@ -83,8 +97,10 @@ class Pilot:
             return False
         state = self._agent.step(now_ns, *seen)
         # The neighbours first: they wait for it, while the vehicle still has its last command.
-        self._publish(encode(state, self._clock()))
+        self._mouth.state(encode(state, self._clock()))
         command(self._vehicle, state)
+        if (places := self._agent.places()) is not None:
+            self._mouth.places(encode(places))
         if state.mode is not self._mode:
             _log.info("%s at height %.2f m (%s)", state.mode, state.position[2], state.flags.name or "no flags")
             self._mode = state.mode
@@ -98,7 +114,8 @@ def run(
     agent: Agent,
     vehicle: Vehicle,
     inbox: Inbox,
-    publish: Publish,
+    mouth: Mouth,
+    links: NearLinks,
     status: StatusReporter,
     clock: Clock,
     stopping: threading.Event,
@@ -109,18 +126,21 @@ def run(
         agent: Its brain.
         vehicle: Its body.
         inbox: Filled by the bus with everything in `agent.senses.keys`.
-        publish: Sends its state.
+        mouth: Sends what it says.
+        links: To those who come near.
         status: Tells its health.
         clock: The process's clock.
         stopping: Ends the loop.
     """
-    turns = Turns(Pilot(agent, vehicle, inbox, publish, clock).turn, clock)
+    turns = Turns(Pilot(agent, vehicle, inbox, mouth, clock).turn, clock)
     inbox.answer = turns.take_aside
     while not stopping.is_set():
         turns.take()
+        links.follow(agent.near)
         status.tick(agent.steps, "running" if agent.steps else "starting", agent.senses.rejected)
         turns.rest(LONGEST_WAIT)
     turns.end()
+    links.close()
     status.tick(agent.steps, "ending", agent.senses.rejected, force=True)
 
 

@@ -210,6 +210,22 @@ def join(
     return bus
 
 
+def reach(scenario: Scenario, formation: Formation, node: str, other: str) -> Bus:
+    """Opens a second session of a node that hears one other node, beside the links that it always has.
+
+    Args:
+        scenario: The scenario; `net` says how.
+        formation: Its formation.
+        node: Name of the node (`shared.nodes`).
+        other: Name of the other.
+
+    Raises:
+        ConfigError: As for `join`.
+        DeviceError: There is a router, and it does not answer.
+    """
+    return ZenohBus(node_settings(scenario, formation, node, only=other))
+
+
 def _hand_on_air(scenario: Scenario) -> Receiver | None:
     """Begins to listen to the relay where its profile puts it on the air, and to nobody else there."""
     if scenario.net.profile != "radio":

@@ -97,6 +97,8 @@ class Heard(NamedTuple):
     arrival_ns: UInt64
 
 
+MOST_SEEN = 32
+"""Of so many drones at most somebody tells where it saw them."""
 MOST_LOST = 16
 """Of so many drones that it no longer hears one says at most where they were."""
 
@@ -181,6 +183,18 @@ class DroneState(Message, frozen=True, kw_only=True):
     unheard: tuple[DroneId, ...] = ()
     lost: tuple[Seen, ...] = ()
     step_ns: UInt64 = 0
+
+
+class Places(Message, frozen=True, kw_only=True):
+    """Where a drone knows whom, heard or told by others: in a swarm in which not everybody hears everybody.
+
+    Attributes:
+        id: Number of the drone.
+        seen: Itself first, then the others, the nearest of many.
+    """
+
+    id: DroneId
+    seen: tuple[Seen, ...]
 
 
 class ObstacleState(Message, frozen=True, kw_only=True):

@@ -66,10 +66,30 @@ def neighbours(scenario: Scenario, formation: Formation, drone: int) -> tuple[in
     """Returns the drones that one hears: all of a small swarm, else its ancestors and those near it."""
     if len(formation.ids) <= scenario.net.full_mesh:
         return tuple(other for other in formation.ids if other != drone)
+    return tuple(sorted((_resting_near(formation, drone) | set(formation.ancestors(drone))) - {drone}))
+
+
+def tellers(scenario: Scenario, formation: Formation, drone: int) -> tuple[int, ...]:
+    """Returns the drones that tell one where others are; none where everybody hears everybody.
+
+    It is its references, those who refer to it and those that rest near it; those who refer to nobody but the
+    human make a chain. So the word of anybody goes round to everybody.
+    """
+    if len(formation.ids) <= scenario.net.full_mesh:
+        return ()
+    found = _resting_near(formation, drone) | set(formation.references(drone))
+    found.update(other for other in formation.ids if drone in formation.references(other))
+    first = [other for other in formation.ids if not formation.references(other)]
+    if drone in first:
+        at = first.index(drone)
+        found.update(first[max(at - 1, 0) : at + 2])
+    return tuple(sorted(found - {drone}))
+
+
+def _resting_near(formation: Formation, drone: int) -> set[int]:
     own = formation.rest[formation.row(drone)]
     pairs = zip(formation.ids, formation.rest, strict=True)
-    near = {other for other, place in pairs if math.dist(own, place) <= NEAR}
-    return tuple(sorted((near | set(formation.ancestors(drone))) - {drone}))
+    return {other for other, place in pairs if math.dist(own, place) <= NEAR}
 
 
 def _linked(scenario: Scenario, formation: Formation, node: str, earlier: str) -> bool:
@@ -81,4 +101,5 @@ def _linked(scenario: Scenario, formation: Formation, node: str, earlier: str) -
     if not (node.startswith("drone/") and earlier.startswith("drone/")):
         return True
     one, other = int(node.removeprefix("drone/")), int(earlier.removeprefix("drone/"))
-    return other in neighbours(scenario, formation, one) or one in neighbours(scenario, formation, other)
+    heard = other in neighbours(scenario, formation, one) or one in neighbours(scenario, formation, other)
+    return heard or other in tellers(scenario, formation, one)

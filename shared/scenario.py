@@ -404,7 +404,7 @@ class Net:
             port of it for a flight on one machine.
         interface: Network interface of the radio, for example `wlan0`.
         adminspace: Whether nodes answer Zenoh's adminspace queries (for inspection).
-        full_mesh: Up to this many drones everyone links to everyone; of more, only those who must.
+        full_mesh: Up to this many drones everyone links to everyone; of more, who must or comes near.
         pointer: Unix socket where the relay's `pointer://` source hears consoles: an absolute path, or a name
             in a folder that only their user can enter; empty: it has none.
     """

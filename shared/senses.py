@@ -10,12 +10,12 @@ from msgspec.structs import replace
 from shared.clock import NS_PER_S
 from shared.codec import decode
 from shared.errors import DecodeError
-from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, ObstacleState, Wish
+from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, ObstacleState, Places, Wish
 from shared.obstacle_watch import ObstacleWatch
 from shared.order import Sample, check_newer
 from shared.plausibility import HAND_LIMITS, Believed, MotionLimits, believe, check_possible
 from shared.signature import Verify
-from shared.topics import DRONE_STATE, HAND, OBSTACLE, parse_key
+from shared.topics import DRONE_STATE, HAND, OBSTACLE, PLACES, parse_key
 from shared.transport import Arrival
 
 M = TypeVar("M", bound=Message)
@@ -57,11 +57,14 @@ class Senses:
         verify: Checks the signature of hand samples; None accepts unsigned ones.
         bodies: What the bodies of drones can do; None believes everything, as one who only shows it does.
         obstacles: Whether to listen to moving obstacles as well.
+        aside: Numbers of the drones that are heard at times, over links of their own.
+        tellers: Numbers of the drones that tell where others are.
 
     Attributes:
         hand: Newest hand sample, None before the first.
         drones: Newest state per drone that was ever heard.
         obstacles: What is known of moving obstacles.
+        places: What each of those who tell told last.
         doubted_ns: When something that was not believed last came, by key (own clock).
         rejected: Dropped samples by reason.
     """
@@ -73,10 +76,13 @@ class Senses:
         bodies: MotionLimits | None = None,
         *,
         obstacles: bool = False,
+        aside: Iterable[int] = (),
+        tellers: Iterable[int] = (),
     ) -> None:
         self.hand: Sensed[HandSample] | None = None
         self.drones: dict[int, Sensed[DroneState]] = {}
         self.obstacles = ObstacleWatch()
+        self.places: dict[int, Sensed[Places]] = {}
         self._hears_obstacles = obstacles
         self.rejected: Counter[str] = Counter()
         self.doubted_ns: dict[str, int] = {}
@@ -84,13 +90,16 @@ class Senses:
         self._bodies = bodies
         self._believed: dict[int, Believed] = {}
         self._believed_hand: Believed | None = None
-        self._ids = {DRONE_STATE.key(id=drone): drone for drone in ids}
+        self._always = [DRONE_STATE.key(id=drone) for drone in ids]
+        self._ids = {DRONE_STATE.key(id=drone): drone for drone in (*ids, *aside)}
+        self._tellers = {PLACES.key(id=drone): drone for drone in tellers}
         self._logged_ns = 0
 
     @property
     def keys(self) -> list[str]:
         """Returns the keys to subscribe to."""
-        return [_HAND_KEY, *self._ids, *((OBSTACLE.wildcard,) if self._hears_obstacles else ())]
+        obstacles = (OBSTACLE.wildcard,) if self._hears_obstacles else ()
+        return [_HAND_KEY, *self._always, *self._tellers, *obstacles]
 
     def take(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Decodes what has arrived; nothing that anyone sends raises."""
@@ -142,7 +151,7 @@ class Senses:
             return
         drone = self._ids.get(key)
         if drone is None:
-            self._take_obstacle(key, payload, arrival_ns)
+            self._take_other(key, payload, arrival_ns)
             return
         state = decode(payload, DroneState)
         if state.id != drone:
@@ -153,11 +162,34 @@ class Senses:
             self._believe(key, sensed, self._bodies)
         self.drones[drone] = sensed
 
-    def _take_obstacle(self, key: str, payload: bytes, arrival_ns: int) -> None:
+    def hear_places(self, sensed: Sensed[Places]) -> None:
+        """Takes in what a drone tells of others.
+
+        Raises:
+            DecodeError: It is not newer than what that one told last.
+        """
+        if (known := self.places.get(sensed.message.id)) is not None:
+            check_newer(_order(sensed), _order(known), PLACES.stale_s)
+        self.places[sensed.message.id] = sensed
+
+    def _take_other(self, key: str, payload: bytes, arrival_ns: int) -> None:
+        teller = self._tellers.get(key)
+        if teller is not None:
+            self._take_places(key, payload, arrival_ns, teller)
+            return
         place = parse_key(key)
         if place.topic is not OBSTACLE or not self._hears_obstacles:
             raise DecodeError("unknown-key", key)
         self.obstacles.hear(place.id, decode(payload, ObstacleState), arrival_ns)
+
+    def _take_places(self, key: str, payload: bytes, arrival_ns: int, teller: int) -> None:
+        told = decode(payload, Places)
+        if told.id != teller:
+            raise DecodeError("wrong-id", f"drone {told.id} on {key}")
+        if self._bodies is not None:
+            for seen in told.seen:
+                check_possible(seen.position, seen.velocity, self._bodies)
+        self.hear_places(Sensed(told, arrival_ns))
 
     def _check_drone(self, sensed: Sensed[DroneState]) -> None:
         if (known := self.drones.get(sensed.message.id)) is not None:

@@ -19,6 +19,7 @@ from shared.messages import (
     Message,
     ObstacleState,
     PatternEvent,
+    Places,
     ProcessStatus,
 )
 
@@ -62,12 +63,13 @@ class Topic:
 
 HAND = Topic("human/hand", HandSample, 60.0, 0.25, Delivery.STATE)
 DRONE_STATE = Topic("drone/{id}/state", DroneState, 60.0, 0.5, Delivery.STATE)
+PLACES = Topic("drone/{id}/places", Places, 5.0, 1.0, Delivery.STATE)
 OBSTACLE = Topic("obstacle/{id}", ObstacleState, 30.0, 0.25, Delivery.STATE)
 FORMATION_STATE = Topic("formation/state", FormationState, 20.0, 0.5, Delivery.STATE)
 PATTERN = Topic("glove/pattern", PatternEvent, 0.0, 0.0, Delivery.EVENT)
 STATUS = Topic("status/{role}/{id}", ProcessStatus, 1.0, 3.0, Delivery.EVENT)
 
-TOPICS = (HAND, DRONE_STATE, OBSTACLE, FORMATION_STATE, PATTERN, STATUS)
+TOPICS = (HAND, DRONE_STATE, PLACES, OBSTACLE, FORMATION_STATE, PATTERN, STATUS)
 
 ALIVE = "alive/{role}/{id}"
 """Key of a process's liveliness token."""

@@ -22,6 +22,7 @@ from shared.messages import (
     Mode,
     ObstacleState,
     PatternEvent,
+    Places,
     ProcessStatus,
     Seen,
     Wish,
@@ -72,6 +73,9 @@ MESSAGES: dict[type[Message], st.SearchStrategy[Any]] = {
         unheard=st.lists(st.integers(1, 65_535), max_size=4).map(tuple),
         lost=st.lists(LOST, max_size=3).map(tuple),
         step_ns=UINT64,
+    ),
+    Places: st.builds(
+        Places, **ENVELOPE, id=st.integers(1, 65_535), seen=st.lists(LOST, max_size=3).map(tuple)
     ),
     ObstacleState: st.builds(
         ObstacleState,

@@ -1,19 +1,20 @@
 """The air between the processes of a case: who hears what, and when."""
 
+import contextlib
 from collections import defaultdict
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from agents.agent import Agent
 from deploy.falsify.case import Case, Fault
+from deploy.lockstep.lockstep import hand_over
 from deploy.lockstep.ticks import tick_ns
 from shared.clock import NS_PER_S
 from shared.errors import DecodeError
-from shared.messages import DroneState, HandSample
-from shared.senses import Sensed, Senses
+from shared.messages import DroneState, HandSample, Places
 
-Message = HandSample | DroneState
+Message = HandSample | DroneState | Places
 
 _SENDERS = frozenset({"cut", "mute"})
 _HEARERS = frozenset({"cut", "deaf"})
@@ -26,13 +27,10 @@ class Air:
     Args:
         case: Says what the links do.
         ids: Numbers of the drones.
-        listens: Whom each of them listens to.
         rate_hz: Ticks per second; delays are whole ticks.
     """
 
-    def __init__(
-        self, case: Case, ids: Sequence[int], listens: Mapping[int, Collection[int]], rate_hz: float
-    ) -> None:
+    def __init__(self, case: Case, ids: Sequence[int], rate_hz: float) -> None:
         self._rng = np.random.default_rng(case.seed)
         self._loss = case.weather.loss
         self._silences = [fault for fault in case.faults if fault.kind in (*_SENDERS, *_HEARERS, "relay")]
@@ -42,10 +40,6 @@ class Air:
         self._delays = np.rint(self._rng.uniform(0.0, 1.0, shape) * longest).astype(int).tolist()
         self._rows = {drone: row for row, drone in enumerate(ids)}
         self._ids = ids
-        self._listeners = {
-            sender: [row for row, drone in enumerate(ids) if sender == 0 or sender in listens[drone]]
-            for sender in (0, *ids)
-        }
         self._rate = rate_hz
         self._under_way: dict[int, list[tuple[int, Message]]] = defaultdict(list)
         self._drawn: list[float] = []
@@ -69,22 +63,26 @@ class Air:
             tick: When.
             agents: One per drone; None where there is no process.
         """
-        sender = message.id if isinstance(message, DroneState) else 0
+        sender = 0 if isinstance(message, HandSample) else message.id
         if sender in self._mute:
             return
         delays = self._delays[self._rows[sender] + 1 if sender else 0]
-        for row in self._listeners[sender]:
+        for row, agent in enumerate(agents):
+            if agent is None or not _hears(agent, message):
+                continue
             if self._loss and self._draw() < self._loss:
                 continue
             if delays[row]:
                 self._under_way[tick + delays[row]].append((row, message))
             else:
-                self._deliver(row, message, agents[row], tick)
+                self._deliver(row, message, agent, tick)
 
     def _deliver(self, row: int, message: Message, agent: Agent | None, tick: int) -> None:
         if agent is None or self._ids[row] in self._deaf:
             return
-        _hear(agent.senses, message, tick_ns(tick, self._rate))
+        # A late one, overtaken by a newer one or by a new process: counted in flight, nothing else.
+        with contextlib.suppress(DecodeError):
+            hand_over(agent.senses, message, tick_ns(tick, self._rate))
 
     def _draw(self) -> float:
         if not self._drawn:
@@ -92,15 +90,10 @@ class Air:
         return self._drawn.pop()
 
 
-def _hear(senses: Senses, message: Message, now_ns: int) -> None:
-    try:
-        if isinstance(message, HandSample):
-            senses.hear_hand(Sensed(message, now_ns))
-        else:
-            senses.hear_drone(Sensed(message, now_ns))
-    except DecodeError:
-        # A late one, overtaken by a newer one before the process came back: counted in flight, nothing else.
-        return
+def _hears(agent: Agent, message: Message) -> bool:
+    if isinstance(message, HandSample):
+        return True
+    return message.id in agent.tellers if isinstance(message, Places) else agent.hears(message.id)
 
 
 def _drones(faults: Sequence[Fault], kinds: frozenset[str]) -> frozenset[int]:

@@ -22,7 +22,6 @@ from shared.arrays import Vec
 from shared.clock import NS_PER_S
 from shared.formation import Formation
 from shared.messages import DroneState, HandSample, Mode, Vector
-from shared.nodes import neighbours
 from shared.scenario import Scenario
 from shared.scenario_check.check import open_scenario
 from shared.vehicles import vehicle_settings
@@ -110,8 +109,7 @@ class Swarm:
         self._rate = scenario.rates.control_hz
         self._order = [row for level in formation.levels for row in level]
         self._flyers = start_flyers(scenario, formation, places, airborne=case.airborne)
-        listens = {drone: neighbours(scenario, formation, drone) for drone in formation.ids}
-        self._air = Air(case, formation.ids, listens, self._rate)
+        self._air = Air(case, formation.ids, self._rate)
         agents = [self._agent(drone, EPOCH) for drone in formation.ids]
         introduce(agents, formation, self._flyers)
         self._agents: list[Agent | None] = [*agents]
@@ -140,6 +138,8 @@ class Swarm:
             if (agent := self._agents[each]) is not None:
                 state = self._step(agent, each, on, now)
                 self._air.publish(state, self._tick, self._agents)
+                if (told := agent.places()) is not None:
+                    self._air.publish(told, self._tick, self._agents)
                 self._told[each] = (_command_of(state), state.setpoint, now)
                 self._modes[each] = state.mode
         self._move(now)

@@ -20,14 +20,28 @@ from deploy.lockstep.start import EPOCH, introduce, rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.codec import encode
 from shared.formation import Formation
-from shared.messages import DroneState, HandSample, Mode, Vector
+from shared.messages import DroneState, HandSample, Mode, Places, Vector
 from shared.scenario import Scenario
-from shared.senses import Sensed
-from shared.topics import DRONE_STATE, HAND
+from shared.senses import Sensed, Senses
+from shared.topics import DRONE_STATE, HAND, PLACES
 from shared.transport import Arrival
 
 _HAND_KEY = HAND.key()
 _COMMANDS = dict.fromkeys(Mode, FLY) | {Mode.STOP: CUT, Mode.GROUND: IDLE}
+
+
+def hand_over(senses: Senses, message: HandSample | DroneState | Places, now_ns: int) -> None:
+    """Hands a message over as it is.
+
+    Raises:
+        DecodeError: It is not newer than the last one of its kind.
+    """
+    if isinstance(message, HandSample):
+        senses.hear_hand(Sensed(message, now_ns))
+    elif isinstance(message, DroneState):
+        senses.hear_drone(Sensed(message, now_ns))
+    else:
+        senses.hear_places(Sensed(message, now_ns))
 
 
 class Lockstep:
@@ -43,7 +57,7 @@ class Lockstep:
         flyers: The bodies now, in the formation's order.
         tick: Number of the next tick.
         followed: The drones that have been in FOLLOW.
-        payloads: If encoded: what was published in the last tick, by key: the hand's sample and every state.
+        payloads: If encoded: what was published in the last tick, by key.
     """
 
     def __init__(
@@ -61,11 +75,9 @@ class Lockstep:
             for drone in formation.ids
         ]
         introduce(self._agents, formation, self.flyers)
-        self._keys = [DRONE_STATE.key(id=drone) for drone in formation.ids]
-        self._listeners = {
-            key: [agent.senses for agent in self._agents if key in agent.senses.keys]
-            for key in (_HAND_KEY, *self._keys)
-        }
+        self._ids = formation.ids
+        self._near: list[frozenset[int]] = []
+        self._listeners: dict[str, list[Senses]] = {}
 
     def advance(self, sample: HandSample) -> list[DroneState]:
         """Makes one tick.
@@ -77,11 +89,16 @@ class Lockstep:
             What each drone published, in the formation's order.
         """
         now = tick_ns(self.tick, self._rate)
+        self.payloads = {}
+        self._listen()
         self._publish(_HAND_KEY, sample, now)
         states: dict[int, DroneState] = {}
         for row in self._order:
-            states[row] = self._agents[row].step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
-            self._publish(self._keys[row], states[row], now)
+            agent = self._agents[row]
+            states[row] = agent.step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
+            self._publish(DRONE_STATE.key(id=states[row].id), states[row], now)
+            if (told := agent.places()) is not None:
+                self._publish(PLACES.key(id=told.id), told, now)
         ordered = [states[row] for row in range(len(states))]
         self.followed.update(state.id for state in ordered if state.mode is Mode.FOLLOW)
         duration = tick_length(self.tick, self._rate)
@@ -92,19 +109,26 @@ class Lockstep:
         self.tick += 1
         return ordered
 
-    def _publish(self, key: str, message: HandSample | DroneState, now_ns: int) -> None:
+    def _listen(self) -> None:
+        """Notes who hears whom, if that has changed."""
+        near = [agent.near for agent in self._agents]
+        if near == self._near:
+            return
+        self._near = near
+        senses = [(agent, agent.senses) for agent in self._agents]
+        self._listeners = {_HAND_KEY: [own for _, own in senses]}
+        for drone in self._ids:
+            self._listeners[DRONE_STATE.key(id=drone)] = [own for agent, own in senses if agent.hears(drone)]
+            self._listeners[PLACES.key(id=drone)] = [own for agent, own in senses if drone in agent.tellers]
+
+    def _publish(self, key: str, message: HandSample | DroneState | Places, now_ns: int) -> None:
         if self._encoded:
             self.payloads[key] = payload = encode(message)
             for senses in self._listeners[key]:
                 senses.take({key: [Arrival(payload, now_ns)]})
-        elif isinstance(message, HandSample):
-            sample = Sensed(message, now_ns)
-            for senses in self._listeners[key]:
-                senses.hear_hand(sample)
         else:
-            state = Sensed(message, now_ns)
             for senses in self._listeners[key]:
-                senses.hear_drone(state)
+                hand_over(senses, message, now_ns)
 
 
 def fly_lockstep(

@@ -11,7 +11,6 @@ from shared.formation import Formation
 from shared.messages import ORIGIN, DroneState, Mode, Vector
 from shared.scenario import Scenario
 from shared.senses import Sensed
-from shared.topics import DRONE_STATE
 from shared.vehicles import vehicle_settings
 
 EPOCH = 1
@@ -54,7 +53,7 @@ def introduce(agents: Iterable[Agent], formation: Formation, flyers: Sequence[Fl
     states = [_resting(drone, flyer) for drone, flyer in zip(formation.ids, flyers, strict=True)]
     for agent in agents:
         for state in states:
-            if DRONE_STATE.key(id=state.id) in agent.senses.keys:
+            if agent.hears(state.id):
                 agent.senses.hear_drone(Sensed(state, 0))
 
 

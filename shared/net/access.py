@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from shared.nodes import BRIDGE, CONSOLE, OBSERVER, RELAY, WORLD
-from shared.topics import ALIVE, DRONE_STATE, FORMATION_STATE, HAND, OBSTACLE, PATTERN, STATUS, TOPICS
+from shared.topics import ALIVE, DRONE_STATE, FORMATION_STATE, HAND, OBSTACLE, PATTERN, PLACES, STATUS, TOPICS
 
 Rules = dict[str, Any]
 
@@ -26,7 +26,8 @@ def writes(node: str) -> tuple[str, ...]:
         WORLD: (OBSTACLE.wildcard,),
         OBSERVER: (),
     }
-    states = said[node] if node in said else (DRONE_STATE.key(id=node.partition("/")[2]),)
+    number = node.partition("/")[2]
+    states = said[node] if node in said else (DRONE_STATE.key(id=number), PLACES.key(id=number))
     return (*states, *(STATUS.key(role=role, id=ident) for role, ident in _names(node)))
 
 

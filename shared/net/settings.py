@@ -39,7 +39,9 @@ OPEN_TIMEOUT_MS = 4000
 whose handshake the other side gives up half way waits for it, and lets nobody else in, for a minute or two."""
 
 
-def node_settings(scenario: Scenario, formation: Formation, node: str, *, listening: bool = True) -> Settings:
+def node_settings(
+    scenario: Scenario, formation: Formation, node: str, *, listening: bool = True, only: str | None = None
+) -> Settings:
     """Builds the configuration of one node's Zenoh session.
 
     Args:
@@ -47,6 +49,7 @@ def node_settings(scenario: Scenario, formation: Formation, node: str, *, listen
         formation: Its formation.
         node: Name of the node (`shared.nodes`).
         listening: False for a node that nobody dials, as any number of observers are.
+        only: The one node to dial, for a second session that hears that one.
 
     Raises:
         ConfigError: The profile wants keys that are not there, or the node has no session.
@@ -65,6 +68,8 @@ def node_settings(scenario: Scenario, formation: Formation, node: str, *, listen
     own, others = endpoint(scenario, formation, node), dials(scenario, formation, node)
     # Who listens in the same place, as the launcher does in an observer's, is heard as well.
     listen, connect = (own, others) if listening else ("", [*others, own])
+    if only is not None:
+        listen, connect = "", [endpoint(scenario, formation, only)]
     mesh = peer_settings(scenario.swarm.name, listen, connect, adminspace=net.adminspace)
     if net.keys:
         _secure(mesh, Keyring(Path(net.keys)), scenario.swarm.name, node)

@@ -6,14 +6,20 @@ import socket
 import stat
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 
 import zenoh
 
+from agents.near_links import NearLinks
 from deploy.launcher.ports import free_ports
-from shared.bus import ZenohBus
+from shared.bus import ZenohBus, join, reach
+from shared.config import load_scenario
+from shared.formation import build_formation
 from shared.net.settings import OPEN_TIMEOUT_MS, peer_settings
-from shared.topics import HAND
+from shared.nodes import dials, drone_node, endpoint
+from shared.topics import DRONE_STATE, HAND
+from shared.transport import Inbox
 from tests.contract.test_bus_contract import DEADLINE_S, collect, inbox_of, link
 
 
@@ -68,6 +74,33 @@ def test_closing_does_not_wait_for_somebody_who_does_not_answer() -> None:
         start = time.monotonic()
         bus.close()
         assert time.monotonic() - start < OPEN_TIMEOUT_MS / 1000
+
+
+def test_who_comes_near_is_heard_without_a_link_in_the_mesh() -> None:
+    ports = free_ports(tcp=2, udp=0)[0]
+    ends = (19, 20)  # of the two arms
+    where = [f"net.endpoints.drone/{n}=tcp/127.0.0.1:{port}" for n, port in zip(ends, ports, strict=True)]
+    scenario = load_scenario("vee", ["formation.n=20", *where])
+    formation = build_formation(scenario)
+    own, other = map(drone_node, ends)
+    assert endpoint(scenario, formation, own) not in dials(scenario, formation, other)
+    with join(scenario, formation, own) as here, join(scenario, formation, other) as there:
+        inbox, publish = Inbox(time.monotonic_ns), there.publisher(DRONE_STATE, id=20)
+        in_mesh = inbox_of(here, DRONE_STATE.key(id=20))
+
+        def heard(wanted: frozenset[int]) -> bool:
+            links.follow(wanted)
+            publish(b"here")
+            return bool(inbox.take())
+
+        links = NearLinks(
+            lambda _: reach(scenario, formation, own, other), inbox, time.monotonic_ns, ThreadPoolExecutor(1)
+        )
+        assert not heard(frozenset())
+        wait_for(lambda: heard(frozenset({20})))
+        wait_for(lambda: not heard(frozenset()))
+        links.close()
+        assert in_mesh.take() == {}
 
 
 def lingers(port: int) -> list[int]:

@@ -1,6 +1,7 @@
 """The agent without its process: bytes and time in, state out; and the loop around it."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -11,7 +12,8 @@ from msgspec.structs import replace
 from agents.agent import Agent
 from agents.company import SETTLING
 from agents.control.modes import HAND_LAND, MISSED_HOLD, MISSED_LAND
-from agents.loop import PoseWatch, command, run
+from agents.loop import Mouth, PoseWatch, command, run
+from agents.near_links import NearLinks
 from agents.settings import agent_settings
 from agents.vehicles.base import Pose
 from shared.clock import NS_PER_S
@@ -32,7 +34,7 @@ from shared.messages import (
     Wish,
 )
 from shared.process import StatusReporter
-from shared.topics import DRONE_STATE, HAND, STATUS
+from shared.topics import DRONE_STATE, HAND, PLACES, STATUS
 from shared.transport import Arrival, Inbox
 from tests.strategies import MESSAGES
 
@@ -365,7 +367,9 @@ def test_the_loop_waits_for_a_pose_then_steps_commands_and_publishes() -> None:
     inbox.put(HAND.key(), encode(hand(0, wish=Wish.STOP)))
     vehicle = FakeVehicle([None, None, FLYING], stopping)
     status = StatusReporter(bus, "drone", 1, clock)
-    run(agent(1), vehicle, inbox, bus.publisher(DRONE_STATE, id=1), status, clock, stopping)
+    mouth = Mouth(bus.publisher(DRONE_STATE, id=1), bus.publisher(PLACES, id=1))
+    links = NearLinks(lambda _: MemoryBus(network), inbox, clock, ThreadPoolExecutor(1))
+    run(agent(1), vehicle, inbox, mouth, links, status, clock, stopping)
     taken = heard.take()
     states = [decode(arrival.payload, DroneState) for arrival in taken[DRONE_STATE.key(id=1)]]
     assert vehicle.orders == ["stop"] * 5

@@ -14,7 +14,7 @@ PACKAGES = ("agents", "human_relay", "glove_bridge", "observer", "shared", "depl
 PURE = [
     *sorted((ROOT / "agents/control").glob("*.py")),
     *sorted((ROOT / "agents/vehicles/bodies").glob("*.py")),
-    *(ROOT / f"agents/{name}.py" for name in ("agent", "settings", "stepping")),
+    *(ROOT / f"agents/{name}.py" for name in ("agent", "company", "settings", "stepping", "vicinity")),
     ROOT / "agents/vehicles/world/referee.py",
     *(ROOT / f"human_relay/{name}.py" for name in ("velocity", "relay", "pointing")),
     *(

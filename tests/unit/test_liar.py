@@ -10,7 +10,7 @@ from deploy.lockstep.lockstep import Lockstep
 from deploy.lockstep.start import start_flyers
 from shared.config import load_scenario
 from shared.formation import build_formation
-from shared.messages import DroneState, Flag, HandSample, Mode
+from shared.messages import DroneState, Flag, HandSample, Mode, Places
 from tests.hands import REST, still
 
 BEGIN, END, LENGTH = 120, 420, 720
@@ -33,7 +33,7 @@ class Lying(Lockstep):
     liar: int
     lie: Lie | None
 
-    def _publish(self, key: str, message: HandSample | DroneState, now_ns: int) -> None:
+    def _publish(self, key: str, message: HandSample | DroneState | Places, now_ns: int) -> None:
         if (
             isinstance(message, DroneState)
             and message.id == self.liar

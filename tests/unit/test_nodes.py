@@ -20,6 +20,7 @@ from shared.nodes import (
     drone_node,
     endpoint,
     neighbours,
+    tellers,
 )
 from shared.scenario import Scenario
 
@@ -136,3 +137,35 @@ def test_clients_of_a_router_dial_it_alone_and_listen_nowhere() -> None:
             "",
             ["tcp/10.0.0.9:7447"],
         )
+
+
+@given(swarm=SWARMS)
+@settings(max_examples=30)
+def test_the_word_of_anybody_goes_round_to_everybody_of_a_large_swarm(swarm: Swarm) -> None:
+    scenario, formation = swarm
+    told_by = {drone: tellers(scenario, formation, drone) for drone in formation.ids}
+    if len(formation.ids) <= scenario.net.full_mesh:
+        assert not any(told_by.values())
+        return
+    found = set(links(swarm))
+    for drone, others in told_by.items():
+        assert all(drone in told_by[other] for other in others)
+        assert all(frozenset((drone_node(drone), drone_node(other))) in found for other in others)
+    reached, pending = set(), [formation.ids[0]]
+    while pending:
+        reached.add(drone := pending.pop())
+        pending += set(told_by[drone]) - reached
+    assert reached == set(formation.ids)
+
+
+def test_lines_that_refer_to_the_human_alone_tell_each_other() -> None:
+    drones = ",".join(
+        f'{{id={n},references=["{"human" if n % 10 == 1 else n - 1}"],offset=[-2.0,{(n - 1) // 10 * 4.0},0.0]}}'
+        for n in range(1, 21)
+    )
+    scenario = load_scenario(
+        "rhombus", [f"formation={{shape='custom',drones=[{drones}]}}", "swarm.law=stable", "fence.room=99"]
+    )
+    formation = build_formation(scenario)
+    assert tellers(scenario, formation, 11) == (1, 12)
+    assert tellers(scenario, formation, 5) == (4, 6)

@@ -16,6 +16,7 @@ from shared.topics import (
     HAND,
     OBSTACLE,
     PATTERN,
+    PLACES,
     STATUS,
     TOPICS,
     Delivery,
@@ -28,6 +29,7 @@ from shared.topics import (
 KEYS = [
     (HAND, HAND.key(), "human/hand"),
     (DRONE_STATE, DRONE_STATE.key(id=2), "drone/2/state"),
+    (PLACES, PLACES.key(id=2), "drone/2/places"),
     (FORMATION_STATE, FORMATION_STATE.key(), "formation/state"),
     (PATTERN, PATTERN.key(), "glove/pattern"),
     (STATUS, STATUS.key(role="drone", id=2), "status/drone/2"),
@@ -52,6 +54,7 @@ def test_wildcards_have_one_star_per_varying_chunk() -> None:
     assert {topic.wildcard for topic in TOPICS} == {
         "human/hand",
         "drone/*/state",
+        "drone/*/places",
         "obstacle/*",
         "formation/state",
         "glove/pattern",
@@ -113,7 +116,7 @@ def test_presence_does_not_mix_with_messages() -> None:
 def test_what_drives_control_is_state_and_what_informs_is_reliable() -> None:
     by_delivery = {delivery: {t for t in TOPICS if t.delivery is delivery} for delivery in Delivery}
     assert by_delivery == {
-        Delivery.STATE: {HAND, DRONE_STATE, OBSTACLE, FORMATION_STATE},
+        Delivery.STATE: {HAND, DRONE_STATE, PLACES, OBSTACLE, FORMATION_STATE},
         Delivery.EVENT: {PATTERN, STATUS},
     }
 
