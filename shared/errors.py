@@ -6,7 +6,15 @@ class SwarmTouchError(Exception):
 
 
 class ConfigError(SwarmTouchError):
-    """A configuration that is refused before anything starts: file, key and a hint."""
+    """A configuration that is refused before anything starts: file, key and a hint.
+
+    Args:
+        reasons: Everything that is wrong with it, a line each.
+    """
+
+    def __init__(self, *reasons: str) -> None:
+        super().__init__("\n".join(reasons))
+        self.reasons = reasons
 
 
 class DecodeError(SwarmTouchError):

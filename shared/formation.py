@@ -140,7 +140,7 @@ def build_formation(scenario: Scenario, origin: str = "scenario") -> Formation:
     """
     everybody = sorted(generate(scenario.formation), key=lambda drone: drone.id)
     where = f"{origin}: at key formation"
-    _check_ids(everybody, scenario, where)
+    _check_ids(everybody, scenario, origin)
     drones = _present(everybody, scenario.formation.absent, where)
     ids = tuple(drone.id for drone in drones)
     columns = _columns(drones)
@@ -166,8 +166,8 @@ def build_formation(scenario: Scenario, origin: str = "scenario") -> Formation:
     )
 
 
-def _check_ids(drones: Sequence[Drone], scenario: Scenario, where: str) -> None:
-    ids = [drone.id for drone in drones]
+def _check_ids(drones: Sequence[Drone], scenario: Scenario, origin: str) -> None:
+    ids, where = [drone.id for drone in drones], f"{origin}: at key formation"
     if not ids:
         raise ConfigError(f"{where}.drones: no drones; list [[formation.drones]] or choose a shape")
     for number, times in Counter(ids).items():
@@ -175,7 +175,10 @@ def _check_ids(drones: Sequence[Drone], scenario: Scenario, where: str) -> None:
             raise ConfigError(f"{where}.drones: id {number} appears {times} times; ids are unique")
     for robot in scenario.vehicles.robots:
         if robot not in map(str, ids):
-            raise ConfigError(f"{where}: vehicles.robots.{robot} names no drone of the formation {ids}")
+            raise ConfigError(
+                f"{origin}: at key vehicles.robots.{robot}: no such drone; the formation's are"
+                f" {', '.join(map(str, ids))}"
+            )
 
 
 def _floats(numbers: Vector) -> Vector:

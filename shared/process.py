@@ -110,7 +110,8 @@ def explain(program: str, error: SwarmTouchError) -> int:
     Returns:
         2 if the configuration is refused (starting again will not help), else 1.
     """
-    print(f"{program}: {plain(error, _LONGEST_LINE)}", file=sys.stderr)
+    for reason in error.reasons if isinstance(error, ConfigError) else [error]:
+        print(f"{program}: {plain(reason, _LONGEST_LINE)}", file=sys.stderr)
     return EXIT_REFUSED if isinstance(error, ConfigError) else EXIT_FAILED
 
 

@@ -3,6 +3,7 @@
 import sys
 
 from shared.errors import ConfigError
+from shared.plain_text import plain
 from shared.scenario_check.check import open_scenario
 from shared.scenario_check.checked import encode_checked
 
@@ -13,7 +14,8 @@ def main() -> int:
     try:
         scenario, _ = open_scenario(source, overrides)
     except ConfigError as error:
-        print(error, file=sys.stderr)
+        for reason in error.reasons:
+            print(plain(reason, sys.maxsize), file=sys.stderr)
         return 2
     sys.stdout.buffer.write(encode_checked(scenario))
     return 0

@@ -9,7 +9,7 @@ from shared.formation import Formation, build_formation
 from shared.scenario import Scenario
 from shared.scenario_check.effect import check_effect
 from shared.scenario_check.finding import Finding
-from shared.scenario_check.network import check_links, check_network
+from shared.scenario_check.network import check_links, check_network, check_nodes
 from shared.scenario_check.room import check_room
 
 
@@ -23,6 +23,7 @@ def check_scenario(scenario: Scenario, formation: Formation, *, network: bool = 
     """
     yield from check_room(scenario, formation)
     yield from check_effect(scenario, formation)
+    yield from check_nodes(scenario, formation)
     yield from check_links(scenario, formation)
     if network:
         yield from check_network(scenario, formation)
@@ -42,11 +43,11 @@ def open_scenario(
         The scenario and its formation.
 
     Raises:
-        ConfigError: One line per thing that is wrong: file, key, and what to do.
+        ConfigError: A reason per thing that is wrong: file, key, and what to do.
     """
     scenario = load_scenario(source, overrides)
     formation = build_formation(scenario, str(source))
     findings = list(check_scenario(scenario, formation, network=network))
     if findings:
-        raise ConfigError("\n".join(f"{source}: {finding}" for finding in findings))
+        raise ConfigError(*(f"{source}: {finding}" for finding in findings))
     return scenario, formation

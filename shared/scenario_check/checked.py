@@ -86,5 +86,6 @@ def _checked_aside(source: str, overrides: Sequence[str]) -> bytes:
     command = [sys.executable, *path, "-m", "shared.scenario_check", source, *overrides]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     if done.returncode:
-        raise ConfigError(done.stderr.decode(errors="replace").strip() or f"{source}: cannot be checked")
+        said = done.stderr.decode(errors="replace").splitlines()
+        raise ConfigError(*said or [f"{source}: cannot be checked"])
     return done.stdout

@@ -19,9 +19,19 @@ _FAR: Vector = (-MAX_POSITION / 3.0,) * 3
 
 def check_network(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
     """Yields what cannot be reached, or not be said."""
-    yield from _nodes(scenario, formation)
+    yield from _ports(scenario, formation)
     yield from _vehicles(scenario, formation)
     yield from _states(formation)
+
+
+def check_nodes(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
+    """Yields the nodes that a scenario names and this swarm does not have."""
+    known = (*all_nodes(formation), *map(drone_node, scenario.formation.absent))
+    for node in scenario.net.endpoints:
+        if node not in known:
+            yield Finding(
+                f'net.endpoints."{node}"', "this swarm has no such node", f"its nodes are {', '.join(known)}"
+            )
 
 
 def check_links(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
@@ -57,7 +67,7 @@ def largest_displacement(link: Link, speed: float) -> float:
     return static / math.tanh(decay) if decay > 0.0 else math.inf
 
 
-def _nodes(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
+def _ports(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
     nodes = all_nodes(formation)
     if scenario.net.base_port + len(nodes) > MAX_PORT + 1:
         yield Finding(
@@ -65,12 +75,6 @@ def _nodes(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
             f"{scenario.net.base_port} leaves no ports for {len(nodes)} nodes",
             f"{MAX_PORT + 1 - len(nodes)} is the last that does",
         )
-    known = (*nodes, *map(drone_node, scenario.formation.absent))
-    for node in scenario.net.endpoints:
-        if node not in known:
-            yield Finding(
-                f'net.endpoints."{node}"', "this swarm has no such node", f"its nodes are {', '.join(known)}"
-            )
 
 
 def _vehicles(scenario: Scenario, formation: Formation) -> Iterator[Finding]:

@@ -10,8 +10,8 @@ from shared.formation import Formation
 from shared.scenario import Pair, Scenario
 from shared.scenario_check.finding import Finding
 
-LOWEST_TAKEOFF = 0.2
-"""Below this height a drone that takes off counts as having landed, m."""
+LOWEST_FLIGHT = 0.2
+"""Below this height a drone that takes off counts as having landed, m; one that follows is about to."""
 BODY = 0.06
 """Half the distance at which two bodies touch, m."""
 START_ROOM = 0.05
@@ -72,11 +72,11 @@ def _heights_fit(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
             f"the fence begins {floor:.2f} m above the ground, where the drones stand",
             "let its height be 0 or less",
         )
-    if takeoff < LOWEST_TAKEOFF:
+    if takeoff < LOWEST_FLIGHT:
         yield Finding(
             "limits.takeoff_height",
             f"{takeoff:g} m is no flight: a drone at this height has landed",
-            f"make it at least {LOWEST_TAKEOFF:g} m",
+            f"make it at least {LOWEST_FLIGHT:g} m",
         )
     if takeoff > highest:
         yield Finding(
@@ -86,11 +86,12 @@ def _heights_fit(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
         )
     heights = [z for _, _, z in formation.rest]
     lowest, tallest = min(heights), max(heights)
-    if hand is not None and not (hand + lowest > max(floor, 0.0) and hand + tallest <= highest):
+    least = max(floor, 0.0) + LOWEST_FLIGHT
+    if hand is not None and not (hand + lowest >= least - _ROUNDING and hand + tallest <= highest):
         yield Finding(
             "hand.height",
-            f"the formation flies from {hand + lowest:.2f} to {hand + tallest:.2f} m high, the fence allows"
-            f" {max(floor, 0.0):.2f} to {highest:.2f} m",
+            f"the formation flies from {hand + lowest:.2f} to {hand + tallest:.2f} m high, ground and fence"
+            f" allow {least:.2f} to {highest:.2f} m",
             "change it, or fence.max",
         )
 

@@ -125,7 +125,7 @@ def drones(*entries: str) -> str:
         ("[formation]\nlinks = ['1-2', '1-2']", ["'1-2' appears 2 times"]),
         ("[[impedance.links]]\nname = '9-9'", ["impedance.links names '9-9'", "the links are ['human-1'"]),
         ("[[impedance.links]]\nname = '1-2'\nstiffness = 0.0", ["formation.links, '1-2'", "must be > 0"]),
-        ("[vehicles.robots.9]\nbody = 'crazyflie'", ["vehicles.robots.9", "no drone of the formation"]),
+        ("[vehicles.robots.9]\nbody = 'crazyflie'", ["vehicles.robots.9", "the formation's are 1, 2, 3, 4"]),
         ("x ==", ["not valid TOML", "line 1"]),
     ],
 )

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from rich.table import Table
 
 from deploy.terminal.console import PlainConsole
-from shared.errors import DeviceError
+from shared.errors import ConfigError, DeviceError
 from shared.plain_text import LONGEST, plain
-from shared.process import EXIT_FAILED, explain
+from shared.process import EXIT_FAILED, EXIT_REFUSED, explain
 
 NASTY = "\x1b]0;mine\x07[/red][bold]x[/x] :smiley: \x9b31m\u202e\u2028\ud800\r\n"
 
@@ -44,6 +44,13 @@ def test_to_a_console_every_string_is_text() -> None:
         PlainConsole(file=out, width=120, force_terminal=False).print(each)
     assert out.getvalue().replace("\n", "").isprintable()
     assert "[bold]x[/x] :smiley:" in out.getvalue()
+
+
+def test_a_reason_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert explain("agents", ConfigError(NASTY, "fence")) == EXIT_REFUSED
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.isprintable()
+    assert second == "agents: fence"
 
 
 def test_an_error_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -75,6 +75,7 @@ def test_the_recorded_flights_pass(flight: Path) -> None:
         ("rhombus", "fence.min=[-9,-9,0.1]", "fence.min"),
         ("rhombus", "hand.height=5.0", "hand.height"),
         ("rhombus", "hand.height=-1.0", "hand.height"),
+        ("rhombus", "hand.height=0.1", "hand.height"),
         ("maze", "hand.clip={min=[-2.5,-1.0],max=[1.0,1.0]}", "hand.clip"),
         ("rhombus", 'obstacles=[{name="a",x=-0.5,y=0.1}]', "obstacles"),
         ("rhombus", 'obstacles=[{name="a",x=3,y=0},{name="a",x=2,y=0}]', "obstacles"),
@@ -129,6 +130,8 @@ def test_what_does_go_together_is_not_refused(name: str, override: str) -> None:
 def test_a_simulator_asks_for_no_network() -> None:
     open_scenario("grid", ["formation.n=400"], network=False)
     open_scenario("line", ["formation.n=200"], network=False)
+    with pytest.raises(ConfigError, match="no such node"):
+        open_scenario("rhombus", ["net.endpoints.drone/9=tcp/10.0.0.1:7447"], network=False)
     with pytest.raises(ConfigError, match="bytes"):
         open_scenario("line", ["formation.n=200"])
 
@@ -142,16 +145,23 @@ def test_every_process_and_command_refuses_alike(
     told = set()
     for command in commands:
         assert main(command) == 2
-        told.add(capsys.readouterr().err.partition(": ")[2])
+        told.add(_reasons(capsys.readouterr().err))
     for process, more in ((agent_process, ["--id", "1"]), (relay_process, []), (world_process, [])):
         monkeypatch.setattr("sys.argv", ["process", "--scenario", str(file), *more])
         assert process.main() == 2
-        told.add(capsys.readouterr().err.partition(": ")[2])
-    (text,) = told
-    assert f"{file}: at key fence" in text
-    assert f"{file}: at key obstacles: column 'a' stands 0.00 m from where drone 1 begins" in text
+        told.add(_reasons(capsys.readouterr().err))
+    (reasons,) = told
+    assert [reason.removeprefix(f"{file}: at key ").partition(":")[0] for reason in reasons] == [
+        *("fence", "fence", "hand.home", "obstacles")
+    ]
+    assert f"{file}: at key obstacles: column 'a' stands 0.00 m from where drone 1 begins" in reasons[-1]
     findings = check_values(*_loaded(file))
     assert {finding.verdict for finding in findings} == {Verdict.BAD}
+
+
+def _reasons(said: str) -> tuple[str, ...]:
+    """What was said without the name of who said it, a line per reason."""
+    return tuple(line.partition(": ")[2] for line in said.splitlines())
 
 
 def _loaded(file: Path) -> tuple[Scenario, Formation]:
