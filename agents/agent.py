@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from agents.around import drones_around, walkers_around
 from agents.company import Company, Memory, look_around
-from agents.control.avoidance import Encounter
 from agents.control.hand import HandInput
 from agents.control.modes import HAND_STALE
 from agents.control.repair import REFERENCE_LOST, Reference
-from agents.control.steering import Bystander
 from agents.control.step import Inputs, Settings, State, start, step
+from agents.settings import clearances
 from agents.stepping import Due, due_ns, step_rule
 from agents.vehicles.base import Pose
 from agents.vicinity import Vicinity
@@ -27,15 +27,10 @@ from shared.vehicles import vehicle_settings
 NEVER = float("inf")
 HAND_KEY = HAND.key()
 
-SILENT_AFTER = 0.1
-"""A drone unheard for this long is kept away from more and more, s ..."""
-SILENT_RADIUS, SILENT_GROWTH, SILENT_LARGEST = 0.35, 0.2, 0.6
-"""... from this distance on, growing at this rate, up to this, m and m/s."""
 DOUBTED_FOR = 1.0
 """That somebody says what cannot be believed is told for this long, s."""
 _PLACES_PERIOD_NS = round(NS_PER_S / PLACES.rate_hz)
 _DOUBTED_NS = round(DOUBTED_FOR * NS_PER_S)
-_SILENT_NS = round(SILENT_AFTER * NS_PER_S)
 _NOBODY: frozenset[int] = frozenset()
 
 
@@ -67,6 +62,7 @@ class Agent:
             bodies_of(scenario, formation),
             aside=everybody,
             tellers=self.tellers,
+            obstacles=True,
         )
         self.steps = 0
         self._drone = drone
@@ -78,6 +74,7 @@ class Agent:
         self._vicinity = Vicinity(always, self._memories) if len(always) < len(everybody) else None
         self._places: Places | None = None
         self._places_due_ns = self._told = 0
+        self._clearances = clearances(scenario, formation, drone)
         self._links = [link.name for link in settings.row.links]
         self._settings = settings
         self._rule = step_rule(scenario.rates)
@@ -142,6 +139,9 @@ class Agent:
             heard=self._note_used(self._state),
             unheard=company.unheard,
             lost=company.lost,
+            ahead=output.ahead,
+            pace=output.pace,
+            asked=output.asked,
             step_ns=now_ns,
         )
         self.steps += 1
@@ -209,7 +209,7 @@ class Agent:
 
     def _inputs(self, now_ns: int, pose: Pose, pose_age: float, company: Company) -> Inputs:
         hand, heard = self.senses.hand, self.senses.drones
-        drones, silent = _around(company, now_ns)
+        safety = self._settings.steering.safety
         return Inputs(
             position=pose.position,
             velocity=pose.velocity,
@@ -220,8 +220,8 @@ class Agent:
             hand_age=NEVER if hand is None else hand.age(now_ns),
             hand_fresh=hand is not None and self._is_fresh(HAND_KEY, hand),
             references=[self._reference(heard.get(kin), key, now_ns) for kin, key in self._kin.items()],
-            drones=drones,
-            silent=silent,
+            drones=drones_around(company, self._clearances, safety.horizontal.lag, now_ns),
+            obstacles=walkers_around(self.senses.obstacles.present(now_ns), safety),
             missed=company.missed,
             awaiting=bool(company.awaited),
             alone=company.alone,
@@ -269,29 +269,6 @@ def hand_input(sample: HandSample) -> HandInput:
         # Counted from the relay's start: seconds since 1970 would leave a float with a quarter microsecond.
         stamp=(sample.stamp_ns - sample.epoch) / NS_PER_S,
     )
-
-
-def _around(company: Company, now_ns: int) -> tuple[list[Encounter], list[Bystander]]:
-    """Returns where the other drones are, and who of them has fallen silent.
-
-    One that is silent stays there for as long as its body may be in the air, and may drift or fall, but comes
-    no closer. So does one that speaks and is not believed: what it says moves nobody, but it is there.
-    """
-    encounters, silent = [], []
-    for sensed in company.heard:
-        (x, y, _), (u, v, _) = sensed.message.position, sensed.message.velocity
-        encounters.append(Encounter(x, y, u, v))
-        if now_ns - sensed.arrival_ns > _SILENT_NS:
-            silent.append(_bystander(x, y, sensed.age(now_ns)))
-    for seen in company.missing:
-        x, y, _ = seen.position
-        encounters.append(Encounter(x, y, 0.0, 0.0))
-        silent.append(_bystander(x, y, seen.age))
-    return encounters, silent
-
-
-def _bystander(x: float, y: float, age: float) -> Bystander:
-    return Bystander(x, y, min(SILENT_RADIUS + SILENT_GROWTH * (age - SILENT_AFTER), SILENT_LARGEST))
 
 
 def memories(scenario: Scenario, others: Iterable[int]) -> dict[int, Memory]:

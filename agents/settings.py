@@ -7,13 +7,28 @@ from agents.control.goals import Row
 from agents.control.hand import HandSettings
 from agents.control.impedance import Link, Spring
 from agents.control.repair import Kin, kin_order
+from agents.control.safety.barrier import Curve
+from agents.control.safety.demands import SafetySettings
+from agents.control.safety.encounter import Berth, Clearance, column_at
+from agents.control.safety.response import Response
 from agents.control.steering import Columns, SteeringSettings
 from agents.control.step import Settings
-from shared.fence import goal_box, hand_box
+from shared.cylinders import columns_of
+from shared.envelope import BODY, KEEP_HAND, MISSION_SHARE, AxisEnvelope, Envelope, envelope_of
+from shared.fence import fence_box, goal_box, hand_box
 from shared.formation import Formation
 from shared.messages import Vector
 from shared.scenario import FieldSettings, Hand, Scenario
 from shared.vehicles import vehicle_settings
+
+INSET = 0.02
+"""Room for the steps of a discrete time, m."""
+FLOOR = 0.15
+"""Who flies in the formation flies no lower, m."""
+HAND_INSET = 0.05
+"""Room for what a hand does within a message's way, m."""
+HAND_COMFORT = 0.13
+"""Wished for beyond what must be kept from a hand, m."""
 
 
 def agent_settings(scenario: Scenario, formation: Formation, drone: int) -> Settings:
@@ -79,17 +94,79 @@ def mapping(hand: Hand, low: Vector, high: Vector, radius: float) -> HandSetting
 def steering_settings(scenario: Scenario, formation: Formation, drone: int) -> SteeringSettings:
     """Returns the steering settings of one drone."""
     low, high = goal_box(scenario, formation)
+    envelope, own_tau = envelope_of(scenario, drone), vehicle_settings(scenario, drone).tau
     return SteeringSettings(
         speed=scenario.limits.speed,
-        acceleration=scenario.limits.acceleration,
+        acceleration=_acceleration(scenario, envelope),
         separation=field_of(scenario.avoidance.separation),
         columns=_columns(scenario),
         low=low,
         high=high,
-        tau=float(vehicle_settings(scenario, drone).tau),  # type: ignore[arg-type]  # resolved: never None
+        tau=envelope.tau if own_tau is None else own_tau,
         always_lead=scenario.swarm.law == "stable",
         lead_above=scenario.hand.max_speed,
+        safety=safety_settings(scenario, formation, envelope),
     )
+
+
+def safety_settings(scenario: Scenario, formation: Formation, envelope: Envelope) -> SafetySettings:
+    """Returns the settings of the safety filter of a drone with such a vehicle."""
+    low, high = fence_box(scenario, formation)
+    lowest, highest = goal_box(scenario, formation)
+    across, up = envelope.horizontal, envelope.vertical
+    side = min(across.tube + INSET, scenario.fence.margin)
+    top = min(up.tube + INSET, scenario.fence.margin)
+    clear, over = BODY + across.tube + INSET, BODY + up.tube + INSET
+    return SafetySettings(
+        horizontal=_response(across),
+        vertical=_response(up),
+        planar=Curve(across.brake, across.rate),
+        upright=Curve(up.brake, up.rate),
+        low=(low[0] + side, low[1] + side, max(low[2], FLOOR)),
+        high=(high[0] - side, high[1] - side, high[2] - top),
+        lowest=lowest,
+        highest=highest,
+        columns=[
+            column_at(column.x, column.y, column.radius + clear, column.high + over)
+            for column in columns_of(scenario)
+        ],
+        hand=Berth(KEEP_HAND + across.tube + HAND_INSET, HAND_COMFORT),
+        over=over,
+    )
+
+
+def clearances(scenario: Scenario, formation: Formation, drone: int) -> dict[int, Clearance]:
+    """Returns how far one drone keeps from each drone."""
+    own, found = envelope_of(scenario, drone), {}
+    for other in formation.ids:
+        envelope = envelope_of(scenario, other)
+        height = max(own.downwash.height, envelope.downwash.height)
+        found[other] = Clearance(own.clearance(envelope), height, _acceleration(scenario, envelope))
+    return found
+
+
+def widest(found: dict[int, Clearance]) -> Clearance:
+    """Returns one clearance that is enough for all."""
+    return Clearance(
+        max(each.distance for each in found.values()),
+        max(each.height for each in found.values()),
+        max(each.surprise for each in found.values()),
+    )
+
+
+def _response(axis: AxisEnvelope) -> Response:
+    return Response(
+        stiffness=axis.stiffness,
+        damping=axis.damping,
+        feed=axis.feed,
+        lag=axis.lag,
+        acceleration=axis.acceleration,
+    )
+
+
+def _acceleration(scenario: Scenario, envelope: Envelope) -> float:
+    """Returns how hard the mission may accelerate such a vehicle, m/s^2."""
+    return min(scenario.limits.acceleration, MISSION_SHARE * envelope.horizontal.acceleration)
 
 
 def field_of(settings: FieldSettings) -> Field:
@@ -102,7 +179,7 @@ def _columns(scenario: Scenario) -> Columns | None:
         return None
     rules = scenario.avoidance
     return Columns(
-        tuple((float(o.x), float(o.y)) for o in scenario.obstacles),
+        centres=tuple((float(o.x), float(o.y)) for o in scenario.obstacles),
         projected=rules.rule == "projection",
         field=field_of(rules.columns),
         xi=rules.xi,

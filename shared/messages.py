@@ -166,6 +166,9 @@ class DroneState(Message, frozen=True, kw_only=True):
         unheard: Numbers of the drones that it should hear, and does not.
         lost: Where it saw those of them last whom it ever heard.
         step_ns: When the step started (publisher's clock, same as `stamp_ns` and `arrival_ns`).
+        ahead: Where the body will be once its vehicle has answered (docs/safety.md), m; absent: its position.
+        pace: Velocity of that point, m/s; absent: that of the body.
+        asked: Acceleration of that point, which its vehicle is asked for, m/s^2.
     """
 
     id: DroneId
@@ -183,6 +186,9 @@ class DroneState(Message, frozen=True, kw_only=True):
     unheard: tuple[DroneId, ...] = ()
     lost: tuple[Seen, ...] = ()
     step_ns: UInt64 = 0
+    ahead: Position | None = None
+    pace: Velocity | None = None
+    asked: Velocity = ORIGIN
 
 
 class Places(Message, frozen=True, kw_only=True):

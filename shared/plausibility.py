@@ -23,6 +23,8 @@ BODY_SPEED, FALL_SPEED = 5.0, 10.0
 """A small drone that is blown away or falls indoors is no faster, m/s."""
 MARGIN = 4.0
 """Nor is one that follows: it overshoots, and goes faster where it has to catch up or to escape."""
+FURTHEST_AHEAD, AHEAD_SLACK = 1.0, 0.1
+"""A body is looked at no further ahead than this, s, m."""
 BEYOND_FENCE = 2.0
 """How far out of the fence a body may get, m: it may be pushed, carried or badly tracked."""
 
@@ -106,6 +108,27 @@ def check_possible(position: Vector, velocity: Vector, limits: MotionLimits) -> 
     u, v, w = velocity
     if not _length(u, v, w * limits.speed / limits.vertical_speed) <= limits.speed:
         raise DecodeError("too-fast", f"{_said(velocity)} m/s")
+
+
+def check_ahead(position: Vector, velocity: Vector, ahead: Vector, pace: Vector, limits: MotionLimits) -> None:
+    """Refuses a point ahead (docs/safety.md) that is not where a body can be soon, going on as it does.
+
+    Args:
+        position: Of the body, m.
+        velocity: The same, m/s.
+        ahead: The point, m.
+        pace: Its velocity, m/s.
+        limits: What is possible.
+
+    Raises:
+        DecodeError: `outside`, `too-fast` or `ahead`.
+    """
+    check_possible(ahead, pace, limits)
+    x, y, z = position
+    a, b, c = ahead
+    u, v, w = velocity
+    if not _length(a - x, b - y, c - z) <= FURTHEST_AHEAD * _length(u, v, w) + AHEAD_SLACK:
+        raise DecodeError("ahead", f"at {_said(position)}, and soon at {_said(ahead)} m")
 
 
 def believe(

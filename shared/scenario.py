@@ -312,7 +312,9 @@ class VehicleSettings:
         uri: Backend, `{id}` is replaced by the drone's number.
         body: Simulated body: `identified` or `crazyflie`.
         link_loss: What a simulated body does without commands: `crazyflie` or `hover`.
-        tau: Lag of the vehicle that the `stable` law leads by, s.
+        envelope: What the vehicle can do: a file of `swarmtouch vehicle identify`, or one that ships by its
+            name; absent: that of the simulated body.
+        tau: Lag of the vehicle that the `stable` law leads by, s; absent: that of the envelope.
         battery: Fault of a simulated vehicle: its charge at the start, 0..1.
         endurance: The same: flying time from full to empty, s; absent: its battery never drains.
         pose_silence: The same: (start, length) of a time without poses, s from the start of the world.
@@ -322,6 +324,7 @@ class VehicleSettings:
     uri: str | None = None
     body: Literal["identified", "crazyflie"] | None = None
     link_loss: Literal["crazyflie", "hover"] | None = None
+    envelope: str | None = None
     tau: float | None = field(default=None, validator=optional(_not_negative))
     battery: float | None = field(default=None, validator=optional(_not_negative))
     endurance: float | None = field(default=None, validator=optional(_positive))

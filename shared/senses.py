@@ -13,7 +13,7 @@ from shared.errors import DecodeError
 from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, ObstacleState, Places, Wish
 from shared.obstacle_watch import ObstacleWatch
 from shared.order import Sample, check_newer
-from shared.plausibility import HAND_LIMITS, Believed, MotionLimits, believe, check_possible
+from shared.plausibility import HAND_LIMITS, Believed, MotionLimits, believe, check_ahead, check_possible
 from shared.signature import Verify
 from shared.topics import DRONE_STATE, HAND, OBSTACLE, PLACES, parse_key
 from shared.transport import Arrival
@@ -204,6 +204,8 @@ class Senses:
         state, at_ns = sensed.message, sensed.arrival_ns
         try:
             check_possible(state.goal, state.goal_velocity, bodies)
+            ahead, pace = state.ahead or state.position, state.pace or state.velocity
+            check_ahead(state.position, state.velocity, ahead, pace, bodies)
             known = self._believed.get(state.id)
             self._believed[state.id] = believe(known, state.position, state.velocity, at_ns, bodies)
         except DecodeError:

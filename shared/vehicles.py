@@ -15,7 +15,7 @@ def vehicle_settings(scenario: Scenario, drone: int) -> VehicleSettings:
         drone: Number of the drone.
 
     Returns:
-        Every setting filled in; `{id}` in the URI replaced.
+        Every setting that has a default filled in; `{id}` in the URI replaced.
     """
     vehicles = scenario.vehicles
     robot = vehicles.robots.get(str(drone), VehicleSettings())
@@ -29,6 +29,4 @@ def vehicle_settings(scenario: Scenario, drone: int) -> VehicleSettings:
     return VehicleSettings(**{**chosen, "uri": uri})
 
 
-_VEHICLE_DEFAULTS = VehicleSettings(
-    uri="sim://127.0.0.1:7400/{id}", body="identified", link_loss="crazyflie", tau=0.45
-)
+_VEHICLE_DEFAULTS = VehicleSettings(uri="sim://127.0.0.1:7400/{id}", body="identified", link_loss="crazyflie")

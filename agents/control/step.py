@@ -1,17 +1,19 @@
 """One control step of one drone: mode, hand, links, goal, steering. State and time in, state and output out."""
 
+from dataclasses import dataclass
 from typing import Final, final
 
 from agents.control import modes
-from agents.control.avoidance import Encounter
 from agents.control.goals import Guide, Row, goal_of
 from agents.control.hand import HandInput, HandSettings, MappedHand, freeze, map_hand
 from agents.control.impedance import AT_REST, LinkState, step_links
 from agents.control.modes import ModeInputs, ModeState, next_mode
 from agents.control.repair import Kin, Reference, StandIn, all_follow, guide_of, guides, is_gone, replace_lost
+from agents.control.safety.demands import SafetySettings
+from agents.control.safety.encounter import Encounter, walker_seen
+from agents.control.safety.motion import Motion, start_motion, watch
 from agents.control.steering import (
     LONGEST_STEP,
-    Bystander,
     Steered,
     SteeringSettings,
     Surroundings,
@@ -42,6 +44,7 @@ MISSED: Final[int] = Flag.MISSED.value
 
 
 @final
+@dataclass(frozen=True, kw_only=True)
 class Settings:
     """Everything about one drone that does not change in flight.
 
@@ -56,37 +59,14 @@ class Settings:
         landing_speed: m/s.
     """
 
-    __slots__ = (
-        "hand",
-        "kin",
-        "landing_speed",
-        "row",
-        "stable",
-        "steering",
-        "takeoff_height",
-        "takeoff_speed",
-    )
-
-    def __init__(
-        self,
-        *,
-        row: Row,
-        hand: HandSettings,
-        steering: SteeringSettings,
-        stable: bool,
-        kin: tuple[Kin, ...],
-        takeoff_height: float,
-        takeoff_speed: float,
-        landing_speed: float,
-    ) -> None:
-        self.row: Final = row
-        self.hand: Final = hand
-        self.steering: Final = steering
-        self.stable: Final = stable
-        self.kin: Final = kin
-        self.takeoff_height: Final = takeoff_height
-        self.takeoff_speed: Final = takeoff_speed
-        self.landing_speed: Final = landing_speed
+    row: Row
+    hand: HandSettings
+    steering: SteeringSettings
+    stable: bool
+    kin: tuple[Kin, ...]
+    takeoff_height: float
+    takeoff_speed: float
+    landing_speed: float
 
 
 @final
@@ -104,28 +84,11 @@ class Inputs:
         hand_fresh: Whether it is newer than the one of the last step.
         references: What is known of each of the kin; None where never heard.
         drones: Every other drone.
-        silent: Those of them that have fallen silent, where they may be by now.
+        obstacles: Whatever else moves about and does not look.
         missed: Others do not hear this drone, or it does not hear them.
         awaiting: It does not know of everybody whom it must avoid.
         alone: It hears nobody although there are others.
     """
-
-    __slots__ = (
-        "alone",
-        "awaiting",
-        "battery",
-        "drones",
-        "hand",
-        "hand_age",
-        "hand_fresh",
-        "missed",
-        "pose_age",
-        "position",
-        "references",
-        "silent",
-        "velocity",
-        "wish",
-    )
 
     def __init__(
         self,
@@ -140,7 +103,7 @@ class Inputs:
         hand_fresh: bool,
         references: list[Reference | None],
         drones: list[Encounter],
-        silent: list[Bystander],
+        obstacles: list[Encounter],
         missed: bool,
         awaiting: bool,
         alone: bool,
@@ -155,7 +118,7 @@ class Inputs:
         self.hand_fresh: Final = hand_fresh
         self.references: Final = references
         self.drones: Final = drones
-        self.silent: Final = silent
+        self.obstacles: Final = obstacles
         self.missed: Final = missed
         self.awaiting: Final = awaiting
         self.alone: Final = alone
@@ -170,22 +133,12 @@ class State:
         hand: Mapped hand, None before the first sample.
         links: Impedance links, in the order of the row's.
         trajectory: Reference of the set-point.
+        motion: What is known about the own body.
         anchor: Own goal while no reference is usable, m.
         blocked_for: How long the drone has not arrived, s.
         missed_for: How long others have not heard it, or it not them, s.
         stand_ins: How far each of the kin has been replaced; none while all speak for themselves.
     """
-
-    __slots__ = (
-        "anchor",
-        "blocked_for",
-        "hand",
-        "links",
-        "missed_for",
-        "mode",
-        "stand_ins",
-        "trajectory",
-    )
 
     def __init__(
         self,
@@ -193,6 +146,7 @@ class State:
         hand: MappedHand | None,
         links: tuple[LinkState, ...],
         trajectory: Trajectory,
+        motion: Motion,
         anchor: Vector,
         blocked_for: float,
         missed_for: float,
@@ -202,6 +156,7 @@ class State:
         self.hand: Final = hand
         self.links: Final = links
         self.trajectory: Final = trajectory
+        self.motion: Final = motion
         self.anchor: Final = anchor
         self.blocked_for: Final = blocked_for
         self.missed_for: Final = missed_for
@@ -216,14 +171,27 @@ class Output:
         goal: m.
         goal_velocity: m/s.
         setpoint: m.
+        ahead: Point ahead of the own body, m.
+        pace: Its velocity, m/s.
+        asked: Its acceleration, m/s^2.
         flags: Conditions, bits of `Flag`.
     """
 
-    __slots__ = ("flags", "goal", "goal_velocity", "setpoint")
-
-    def __init__(self, goal: Vector, goal_velocity: Vector, setpoint: Vector, flags: int) -> None:
+    def __init__(
+        self,
+        goal: Vector,
+        goal_velocity: Vector,
+        setpoint: Vector,
+        ahead: Vector,
+        pace: Vector,
+        asked: Vector,
+        flags: int,
+    ) -> None:
         self.goal: Final = goal
         self.goal_velocity: Final = goal_velocity
+        self.ahead: Final = ahead
+        self.pace: Final = pace
+        self.asked: Final = asked
         self.setpoint: Final = setpoint
         self.flags: Final = flags
 
@@ -235,6 +203,7 @@ def start(position: Vector, settings: Settings, *, airborne: bool) -> State:
         hand=None,
         links=(AT_REST,) * len(settings.row.links),
         trajectory=start_at(position),
+        motion=start_motion(position, ORIGIN, 0.0),
         anchor=position,
         blocked_for=0.0,
         missed_for=0.0,
@@ -273,8 +242,13 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
         anchor = goal = _own_goal(state, mode, inputs.position, settings, min(dt, LONGEST_STEP))
         goal_velocity = ORIGIN
 
-    trajectory = state.trajectory if modes.is_airborne(mode) else start_at(inputs.position)
-    steered = steer(trajectory, goal, goal_velocity, _surroundings(inputs), settings.steering, dt)
+    trajectory, motion = state.trajectory, _motion(state, inputs, settings, dt)
+    if not modes.is_airborne(mode):
+        trajectory = start_at(inputs.position)
+    around = _surroundings(inputs, settings.steering.safety)
+    floor = modes.is_guided(mode)
+    steered = steer(trajectory, motion, goal, goal_velocity, around, settings.steering, dt, floor=floor)
+    guarded = steered.guarded
     late = mode is modes.FOLLOW and distance(goal, inputs.position) > BLOCKED_ERROR
     blocked_for = state.blocked_for + dt if late else 0.0
     flags = _flags(inputs, steered, stand_ins, direct, usable=lead is not None)
@@ -282,8 +256,21 @@ def step(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[S
         flags |= BLOCKED
     if not in_touch:
         flags |= MISSED
-    after = State(mode_state, hand, links, steered.trajectory, anchor, blocked_for, missed_for, stand_ins)
-    return after, Output(goal, goal_velocity, steered.setpoint, flags)
+    after = State(
+        mode_state, hand, links, steered.trajectory, guarded.motion, anchor, blocked_for, missed_for, stand_ins
+    )
+    return after, Output(
+        goal, goal_velocity, guarded.setpoint, guarded.ahead, guarded.pace, guarded.asked, flags
+    )
+
+
+def _motion(state: State, inputs: Inputs, settings: Settings, dt: float) -> Motion:
+    """Takes in the pose; a body on the ground goes nowhere, whatever it is told."""
+    if not modes.is_airborne(state.mode.mode):
+        return start_motion(inputs.position, inputs.velocity, inputs.pose_age)
+    safety = settings.steering.safety
+    across, up = safety.horizontal, safety.vertical
+    return watch(state.motion, inputs.position, inputs.velocity, inputs.pose_age, dt, across, up)
 
 
 def _stand_ins(state: State, inputs: Inputs, settings: Settings, dt: float) -> tuple[StandIn, ...]:
@@ -365,15 +352,16 @@ def _own_goal(state: State, mode: Mode, position: Vector, settings: Settings, dt
     return position
 
 
-def _surroundings(inputs: Inputs) -> Surroundings:
+def _surroundings(inputs: Inputs, safety: SafetySettings) -> Surroundings:
     """Returns who is around; a silent hand stays where it was, but no longer comes closer."""
-    position, flying, hand = inputs.position, inputs.velocity, inputs.hand
+    hand = inputs.hand
     if hand is None:
-        return Surroundings(position, flying, inputs.drones, inputs.silent, [], 0.0)
-    velocity = hand.velocity if inputs.hand_age <= modes.HAND_STALE else ORIGIN
-    x, y, _ = hand.position
-    u, v, _ = velocity
-    return Surroundings(position, flying, inputs.drones, inputs.silent, [Encounter(x, y, u, v)], norm(velocity))
+        return Surroundings(inputs.drones, inputs.obstacles, 0.0)
+    velocity, age = hand.velocity, inputs.hand_age
+    if age > modes.HAND_STALE:
+        velocity, age = ORIGIN, 0.0
+    seen = walker_seen(hand.position, velocity, age, safety.horizontal.lag, safety.hand)
+    return Surroundings(inputs.drones, [seen, *inputs.obstacles], norm(velocity))
 
 
 def _flags(

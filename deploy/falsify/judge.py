@@ -1,6 +1,8 @@
 """What a flight came to: the worst of each class, by the referee's rules, over all ticks at once. Pure.
 
-Who cannot help it is not judged: two bodies that cannot move, a hand and a drone that cannot hear it.
+Who cannot help it is not judged: two bodies that cannot move, a hand and a drone that does not know where it
+is, or that no vehicle of its kind could have fled from (`deploy.falsify.escape`). Where a limit was broken
+while nobody could help it, or from the beginning, it is judged again once it has been kept.
 """
 
 import math
@@ -11,6 +13,7 @@ from attrs import frozen
 
 from agents.vehicles.bodies.state import AIRBORNE_HEIGHT
 from agents.vehicles.world.referee import Rules
+from deploy.falsify.escape import Chase, beyond_help
 from deploy.falsify.swarm import Flown, Mask
 from shared.arrays import Vec
 from shared.cylinders import Cylinder
@@ -79,16 +82,16 @@ def judge(flown: Flown, rules: Rules) -> Verdict:
     low, high = rules.fence
     out = np.maximum(low - position, position - high)
     hand = np.linalg.norm(position - flown.hand[:, None], axis=2)
+    fair = flying & flown.hearing & ~_beyond_help(flown, hand, rules)
     found: Verdict = {
         "drones": _pairs(flown, airborne, ids),
-        "hand": _lowest(hand, flying & flown.hearing, flown.t, ids),
-        "column": _lowest(_column_gaps(position, rules), flying, flown.t, ids),
-        "floor": _lowest(position[..., 2], flown.guided, flown.t, ids),
+        "hand": _judged("hand", hand, fair, flown.t, ids),
+        "column": _judged("column", _column_gaps(position, rules), flying, flown.t, ids),
+        "floor": _judged("floor", position[..., 2], flown.guided, flown.t, ids),
     }
     axes: tuple[Kind, ...] = ("fence_x", "fence_y", "fence_z")
     for axis, kind in enumerate(axes):
-        worst = _lowest(-out[..., axis], flying, flown.t, ids)
-        found[kind] = Worst(-worst.value, worst.t, worst.drones)
+        found[kind] = _judged(kind, out[..., axis], flying, flown.t, ids)
     return found
 
 
@@ -97,8 +100,21 @@ def broken(verdict: Verdict) -> list[Kind]:
     return [kind for kind, worst in verdict.items() if CLASSES[kind].margin(worst.value) < 0.0]
 
 
+def _beyond_help(flown: Flown, hand: Vec, rules: Rules) -> Mask:
+    """Returns whom no vehicle of its kind could have saved from the hand, (T, N)."""
+    keep = CLASSES["hand"].limit
+    near = hand < keep
+    found = np.zeros_like(near)
+    for row, vehicle in enumerate(flown.vehicles):
+        if near[:, row].any():
+            body = flown.position[:, row]
+            chase = Chase(t=flown.t, hand=flown.hand, body=body, vehicle=vehicle, rules=rules)
+            found[:, row] = beyond_help(chase, near[:, row], keep)
+    return found
+
+
 def _pairs(flown: Flown, airborne: Mask, ids: tuple[int, ...]) -> Worst:
-    """Judges the pairs of which one is in the air, and one can keep away from the other.."""
+    """Judges the pairs of which one is in the air, and one can keep away from the other."""
     position = flown.position
     worst = Worst(math.inf)
     for row in range(len(ids) - 1):
@@ -106,7 +122,7 @@ def _pairs(flown: Flown, airborne: Mask, ids: tuple[int, ...]) -> Worst:
         counts = (airborne[:, row + 1 :] | airborne[:, row, None]) & (
             flown.able[:, row + 1 :] | flown.able[:, row, None]
         )
-        nearest = _lowest(gaps, counts, flown.t, ids[row + 1 :])
+        nearest = _judged("drones", gaps, counts, flown.t, ids[row + 1 :])
         if nearest.value < worst.value:
             worst = Worst(nearest.value, nearest.t, (ids[row], *nearest.drones))
     return worst
@@ -125,6 +141,26 @@ def _surface_gaps(position: Vec, cylinder: Cylinder) -> Vec:
     aside = np.hypot(position[..., 0] - cylinder.x, position[..., 1] - cylinder.y) - cylinder.radius
     beyond = np.maximum(cylinder.low - position[..., 2], position[..., 2] - cylinder.high)
     return np.where(beyond <= 0.0, aside, np.hypot(np.maximum(aside, 0.0), np.maximum(beyond, 0.0)))
+
+
+def _judged(kind: Kind, values: Vec, counts: Mask, t: Vec, ids: tuple[int, ...]) -> Worst:
+    """Returns the worst of a class, (T, N), where it counts and since it was last kept."""
+    judged = CLASSES[kind]
+    sign = 1.0 if judged.above else -1.0
+    bad = sign * (values - judged.limit) < 0.0
+    if bad.any():
+        counts = counts & ~_not_begun_there(bad, counts)
+    worst = _lowest(sign * values, counts, t, ids)
+    return Worst(sign * worst.value, worst.t, worst.drones)
+
+
+def _not_begun_there(bad: Mask, counts: Mask) -> Mask:
+    """Returns where a limit has been broken without a break since it did not count, or since the beginning."""
+    found = np.zeros_like(bad)
+    found[0] = bad[0]
+    for tick in range(1, len(bad)):
+        found[tick] = bad[tick] & (found[tick - 1] | ~counts[tick])
+    return found
 
 
 def _lowest(values: Vec, counts: Mask, t: Vec, ids: tuple[int, ...]) -> Worst:

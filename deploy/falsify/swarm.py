@@ -20,6 +20,7 @@ from deploy.lockstep.start import EPOCH, introduce, rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
 from shared.arrays import Vec
 from shared.clock import NS_PER_S
+from shared.envelope import AxisEnvelope, envelope_of
 from shared.formation import Formation
 from shared.messages import DroneState, HandSample, Mode, Vector
 from shared.scenario import Scenario
@@ -38,8 +39,9 @@ class Flown:
         hand: (T, 3) the true hand, m.
         position: (T, N, 3) the true bodies, m.
         able: (T, N) whose process runs, sees its body and is not held: it can keep its distance.
-        hearing: (T, N) who of these has heard the hand lately.
+        hearing: (T, N) who of these has heard lately where the hand is.
         guided: (T, N) who of these follows or holds.
+        vehicles: What the N vehicles can do horizontally.
     """
 
     t: Vec = field()
@@ -48,6 +50,7 @@ class Flown:
     able: Mask = field()
     hearing: Mask = field()
     guided: Mask = field()
+    vehicles: tuple[AxisEnvelope, ...] = field()
 
 
 @lru_cache(maxsize=64)
@@ -73,14 +76,25 @@ def fly(case: Case) -> Flown:
     swarm = Swarm(case, scenario, formation, _start(case, scenario, formation, said[0]))
     rows = [swarm.advance(sample) for sample in said]
     columns = [np.array(column) for column in zip(*rows, strict=True)]
+    true = np.array([pose.position for pose in hand])
     return Flown(
         t=np.array([pose.t_ns / NS_PER_S for pose in hand]),
-        hand=np.array([pose.position for pose in hand]),
+        hand=true,
         position=columns[0],
         able=columns[1],
-        hearing=columns[2],
+        hearing=columns[2] & _is_true(true, said, round(_HAND_LATELY * rate))[:, None],
         guided=columns[3],
+        vehicles=tuple(envelope_of(scenario, drone).horizontal for drone in formation.ids),
     )
+
+
+def _is_true(hand: Vec, said: list[HandSample], lately: int) -> Mask:
+    """Returns at which ticks the hand is, and has lately been, where it is said to be: no mistaken tracker."""
+    wrong = np.linalg.norm(hand - np.array([sample.position for sample in said]), axis=1) > _HAND_OFF
+    begun = np.concatenate([[0], np.cumsum(wrong)])
+    ticks = np.arange(len(wrong))
+    found: Mask = begun[ticks + 1] == begun[np.maximum(ticks - lately, 0)]
+    return found
 
 
 def _start(case: Case, scenario: Scenario, formation: Formation, first: HandSample) -> list[Vector]:
@@ -197,6 +211,10 @@ class Swarm:
 
 _HAND_LATELY = 0.25
 """Who has heard the hand within this time knows where it is, s."""
+
+
+_HAND_OFF = 0.05
+"""A hand that is said to be farther away than this from where it is is another one, m."""
 
 
 def _hears_hand(agent: Agent | None, now_ns: int) -> bool:

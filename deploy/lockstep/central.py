@@ -10,8 +10,9 @@ import numpy as np
 from attrs import evolve
 
 from agents.control.hand import HandInput, MappedHand
+from agents.control.safety.encounter import Clearance
 from agents.control.steering import SteeringSettings
-from agents.settings import drone_row, hand_settings, steering_settings
+from agents.settings import clearances, drone_row, hand_settings, steering_settings, widest
 from deploy.lockstep.flock import Member, advance_flock
 from deploy.lockstep.hand_track import map_samples, track_of
 from deploy.lockstep.record import Moment, Record, make_record
@@ -47,16 +48,19 @@ class Flock:
         flyers = start_flyers(scenario, formation, places, airborne=True, held=held)
         flock: dict[int, Member] = {}
         steering: dict[VehicleSettings, SteeringSettings] = {}
+        clearance: dict[VehicleSettings, Clearance] = {}
         for row in (row for level in formation.levels for row in level):
             drone = formation.ids[row]
             # Drones with equal vehicles steer alike.
             vehicle = evolve(vehicle_settings(scenario, drone), uri=None)
             if vehicle not in steering:
                 steering[vehicle] = steering_settings(scenario, formation, drone)
+                clearance[vehicle] = widest(clearances(scenario, formation, drone))
             flock[drone] = Member(
                 drone_row(scenario, formation, drone),
                 tuple(flock[other] for other in formation.references(drone)),
                 steering[vehicle],
+                clearance[vehicle],
                 flyers[row],
             )
         self.members = [flock[drone] for drone in formation.ids]

@@ -9,18 +9,17 @@ import math
 from typing import Final, final
 
 from agents.control import modes
-from agents.control.avoidance import DRONE_BUBBLE, Encounter
 from agents.control.goals import Guide, Row, goal_of
 from agents.control.hand import HandInput, MappedHand
 from agents.control.impedance import AT_REST, step_links
-from agents.control.steering import Bystander, SteeringSettings, Surroundings, steer
+from agents.control.safety.encounter import Clearance, Encounter, drone_heard, walker_seen
+from agents.control.safety.motion import point_ahead, start_motion, watch
+from agents.control.steering import SteeringSettings, Surroundings, steer
 from agents.control.trajectory import start_at
-from agents.control.vectors import ORIGIN, Vector, norm, rotate
+from agents.control.vectors import ORIGIN, norm, rotate
 from agents.vehicles.bodies.fleet import Flyer, advance
 from agents.vehicles.bodies.state import FLY
 from shared.cells import Cells
-
-_NOBODY: Final[list[Bystander]] = []
 
 
 @final
@@ -30,7 +29,8 @@ class Member:
     Args:
         row: Its row of the formation.
         references: Its references, in the order of the row's weights.
-        steering: Limits and fields.
+        steering: Limits, fields and the filter's.
+        clearance: How far the others keep from it.
         flyer: Its body at the start.
 
     Attributes:
@@ -41,30 +41,39 @@ class Member:
         setpoint: m.
         links: Its impedance links.
         trajectory: Reference of the set-point.
+        motion: What is known about its body.
+        asked: Acceleration that its vehicle is asked for, m/s^2.
         guide: What those follow who refer to it.
         encounter: What those see who keep off it.
     """
 
     def __init__(
-        self, row: Row, references: "tuple[Member, ...]", steering: SteeringSettings, flyer: Flyer
+        self,
+        row: Row,
+        references: "tuple[Member, ...]",
+        steering: SteeringSettings,
+        clearance: Clearance,
+        flyer: Flyer,
     ) -> None:
         self.row: Final = row
         self.references: Final = references
         self.steering: Final = steering
+        self.clearance: Final = clearance
         self.flyer = flyer
         self.position = self.goal = self.setpoint = flyer.body.position
         self.goal_velocity = ORIGIN
         self.links = (AT_REST,) * len(row.links)
         self.trajectory = start_at(self.position)
         self.guide = Guide(self.goal, ORIGIN, modes.FOLLOW)
-        self.encounter = encounter_of(flyer.body.position, flyer.body.velocity)
+        self.motion = start_motion(self.position, flyer.body.velocity, 0.0)
+        self.asked = ORIGIN
+        self.encounter = self.met()
 
-
-def encounter_of(position: Vector, velocity: Vector) -> Encounter:
-    """Returns what is at a position as others meet it, seen from above."""
-    x, y, _ = position
-    u, v, _ = velocity
-    return Encounter(x, y, u, v)
+    def met(self) -> Encounter:
+        """Returns what those see who keep off it."""
+        safety = self.steering.safety
+        ahead, pace = point_ahead(self.motion, safety.horizontal, safety.vertical)
+        return drone_heard(ahead, pace, self.asked, 0.0, self.clearance, yields=True)
 
 
 def advance_flock(
@@ -81,13 +90,16 @@ def advance_flock(
         stable: Whether references are the others' goals instead of their positions.
     """
     _set_goals(flock, hand, dt, stable=stable)
-    own_hand, hand_speed = [encounter_of(sample.position, sample.velocity)], norm(sample.velocity)
+    hand_speed = norm(sample.velocity)
     cells = Cells([member.encounter for member in flock], _reach(flock))
     for member in flock:
-        body, near = member.flyer.body, cells.near(member.encounter)
-        around = Surroundings(body.position, body.velocity, near, _NOBODY, own_hand, hand_speed)
-        steered = steer(member.trajectory, member.goal, member.goal_velocity, around, member.steering, dt)
-        member.trajectory, member.setpoint = steered.trajectory, steered.setpoint
+        rules, goal, rate = member.steering, member.goal, member.goal_velocity
+        lag, berth = rules.safety.horizontal.lag, rules.safety.hand
+        own_hand = [walker_seen(sample.position, sample.velocity, 0.0, lag, berth)]
+        around = Surroundings(cells.near(member.encounter), own_hand, hand_speed)
+        steered = steer(member.trajectory, member.motion, goal, rate, around, rules, dt, floor=True)
+        member.trajectory, guarded = steered.trajectory, steered.guarded
+        member.motion, member.asked, member.setpoint = guarded.motion, guarded.asked, guarded.setpoint
         # Nobody looks at the body itself any more in this tick.
         member.flyer = advance(member.flyer, FLY, member.setpoint, duration)
 
@@ -96,7 +108,11 @@ def _set_goals(flock: list[Member], hand: MappedHand, dt: float, *, stable: bool
     velocity = rotate(hand.velocity, -hand.yaw)
     for member in flock:
         member.position = member.flyer.body.position
-        member.encounter = encounter_of(member.position, member.flyer.body.velocity)
+        flying = member.flyer.body.velocity
+        safety = member.steering.safety
+        across, up = safety.horizontal, safety.vertical
+        member.motion = watch(member.motion, member.position, flying, 0.0, dt, across, up)
+        member.encounter = member.met()
         member.links = step_links(member.links, member.row.links, velocity, dt)
         lead = [reference.guide for reference in member.references]
         goal, rate = goal_of(member.row, member.links, hand, lead)
@@ -107,8 +123,8 @@ def _set_goals(flock: list[Member], hand: MappedHand, dt: float, *, stable: bool
 def _reach(flock: list[Member]) -> float:
     """Returns how far anything can matter, m.
 
-    The field acts on the reference, which is ahead of its body; the bubble grows with the closing speed, at
-    most twice the largest difference from the mean velocity.
+    The field acts on the reference, which is ahead of its body; a barrier's reach grows with the closing speed,
+    at most twice the largest difference from the mean velocity.
     """
     mean_u = mean_v = ahead = apart = 0.0
     for member in flock:
@@ -121,6 +137,10 @@ def _reach(flock: list[Member]) -> float:
         ahead = max(ahead, (x - each.x) * (x - each.x) + (y - each.y) * (y - each.y))
         du, dv = each.u - mean_u, each.v - mean_v
         apart = max(apart, du * du + dv * dv)
-    field = flock[0].steering.separation
-    bubble = DRONE_BUBBLE.radius + DRONE_BUBBLE.lead * 2.0 * math.sqrt(apart)
-    return max(field.radius + field.d0 + math.sqrt(ahead), bubble)
+    reach, closing = 0.0, 2.0 * math.sqrt(apart)
+    for member in flock:
+        safety, field = member.steering.safety, member.steering.separation
+        brake = safety.planar.reach(closing + member.clearance.surprise, safety.horizontal.acceleration)
+        barrier = member.clearance.distance + brake
+        reach = max(reach, field.radius + field.d0 + math.sqrt(ahead), barrier)
+    return reach

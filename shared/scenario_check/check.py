@@ -11,6 +11,7 @@ from shared.scenario_check.effect import check_effect
 from shared.scenario_check.finding import Finding
 from shared.scenario_check.network import check_links, check_network, check_nodes
 from shared.scenario_check.room import check_room
+from shared.scenario_check.vehicles import check_vehicles
 
 
 def check_scenario(scenario: Scenario, formation: Formation, *, network: bool = True) -> Iterator[Finding]:
@@ -22,6 +23,7 @@ def check_scenario(scenario: Scenario, formation: Formation, *, network: bool = 
         network: Whether it is to fly as processes; a simulator in one process has no links between them.
     """
     yield from check_room(scenario, formation)
+    yield from check_vehicles(scenario, formation)
     yield from check_effect(scenario, formation)
     yield from check_nodes(scenario, formation)
     yield from check_links(scenario, formation)

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from shared.cylinders import columns_of
+from shared.envelope import BODY
 from shared.fence import fence_box, goal_box, hand_box, shape_box
 from shared.formation import Formation
 from shared.scenario import Pair, Scenario
@@ -12,8 +13,6 @@ from shared.scenario_check.finding import Finding
 
 LOWEST_FLIGHT = 0.2
 """Below this height a drone that takes off counts as having landed, m; one that follows is about to."""
-BODY = 0.06
-"""Half the distance at which two bodies touch, m."""
 START_ROOM = 0.05
 """Between a column's surface and a body that takes off beside it, m: it drifts a little while it climbs."""
 

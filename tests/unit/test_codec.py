@@ -155,7 +155,7 @@ def test_a_truncation_at_any_length_is_malformed(message: Message) -> None:
 def test_a_field_that_is_missing_is_named(message: Message) -> None:
     fields = fields_of(message)
     optional = {"signature", "displacements", "pose_age", "battery", "flags", "heard", "step_ns", "missing"}
-    optional |= {"unheard", "lost", "jumped"}
+    optional |= {"unheard", "lost", "jumped", "ahead", "pace", "asked"}
     optional |= {"form", "rate_hz", "cpu", "rss_mb", "rejected", "metrics"}
     for name in fields.keys() - {"v"}:
         payload = bytes(msgpack.packb({key: value for key, value in fields.items() if key != name}))

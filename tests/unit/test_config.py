@@ -244,11 +244,7 @@ def test_robot_wins_over_type_wins_over_all() -> None:
     assert (one.uri, three.uri) == ("sim://127.0.0.1:7400/1", "sim://h:1/3")
 
 
-def test_a_vehicle_without_settings_has_all_of_them() -> None:
+def test_a_vehicle_without_settings_has_all_that_it_needs() -> None:
     chosen = vehicle_settings(load_scenario("rhombus"), 4)
-    assert (chosen.uri, chosen.body, chosen.link_loss, chosen.tau) == (
-        "sim://127.0.0.1:7400/4",
-        "identified",
-        "crazyflie",
-        0.45,
-    )
+    assert (chosen.uri, chosen.body, chosen.link_loss) == ("sim://127.0.0.1:7400/4", "identified", "crazyflie")
+    assert chosen.tau is None, "its envelope says"

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from deploy.falsify.swarm import Flown, fly, prepare
 from deploy.lockstep.hand_track import relayed
 from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.record import judge as referee
+from shared.envelope import load_envelope
 from shared.errors import ConfigError
 from shared.messages import Wish
 
@@ -42,6 +44,21 @@ def gone_from(flown: Flown, row: int, t: float) -> float:
     since = flown.t >= t
     path = flown.position[since, row]
     return float(np.linalg.norm(path - path[0], axis=1).max())
+
+
+def flight(places: Any, counts: Any) -> Flown:
+    """Returns bodies at places, a tick per second, all able or not, with a hand at the origin."""
+    ticks, n = counts.shape
+    vehicle = load_envelope("identified").horizontal
+    return Flown(
+        t=np.arange(float(ticks)),
+        hand=np.zeros((ticks, 3)),
+        position=np.asarray(places),
+        able=counts,
+        hearing=counts,
+        guided=counts,
+        vehicles=(vehicle,) * n,
+    )
 
 
 @pytest.mark.parametrize("law", ["paper", "stable"])
@@ -73,6 +90,7 @@ def test_every_class_can_be_broken() -> None:
     column = rules.columns[0]
     places = np.array(
         [
+            [(0.0, -1.0, 1.0), (0.0, 1.0, 1.0)],
             [(0.0, 0.0, 1.0), (0.19, 0.0, 1.0)],
             [(high_x + 0.03, 0.0, 1.0), (0.0, 0.0, 1.0)],
             [(0.0, high_y + 0.04, 1.0), (0.0, 0.0, 1.0)],
@@ -81,22 +99,49 @@ def test_every_class_can_be_broken() -> None:
         ]
     )
     yes = np.ones(places.shape[:2], dtype=bool)
-    flown = Flown(t=np.arange(5.0), hand=np.zeros((5, 3)), position=places, able=yes, hearing=yes, guided=yes)
+    flown = flight(places, yes)
     found = judge(evolve(flown, hand=flown.hand + np.array([0.24, 0.0, 1.0])), evolve(rules, ids=(1, 2)))
     assert set(broken(found)) == set(CLASSES)
     assert found["fence_y"].value == pytest.approx(0.04)
-    assert found["fence_y"].t == 2.0
+    assert found["fence_y"].t == 3.0
     assert (found["floor"].value, found["floor"].drones) == (0.0, (2,))
 
 
+APART, NEAR = (1.0, 0.0, 1.2), (0.1, 0.0, 1.2)
+
+
 def test_who_cannot_help_it_is_not_judged() -> None:
-    places = np.array([[(0.0, 0.0, 1.0), (0.1, 0.0, 1.0), (5.0, 0.0, 1.0)]])
-    yes, no = np.ones((1, 3), dtype=bool), np.zeros((1, 3), dtype=bool)
-    flown = Flown(t=np.zeros(1), hand=places[:, 0], position=places, able=no, hearing=no, guided=no)
+    places = np.array([[REST, APART, (2.0, 0.0, 1.0)], [REST, (0.1, 0.0, 1.2), (5.0, 0.0, 1.0)]])
+    yes, no = np.ones((2, 3), dtype=bool), np.zeros((2, 3), dtype=bool)
+    flown = evolve(flight(places, no), hand=np.array([(0.0, 1.0, 1.2), (0.0, 0.2, 1.2)]))
     rules = evolve(rules_of(CALM), ids=(1, 2, 3))
     assert not broken(judge(flown, rules))
-    assert broken(judge(evolve(flown, able=yes), rules))[:2] == ["drones", "fence_x"]
-    assert "hand" in broken(judge(evolve(flown, able=yes, hearing=yes), rules))
+    assert broken(judge(evolve(flown, able=yes), rules)) == ["drones", "fence_x"]
+    moved = evolve(flown, position=np.array([places[0] - (0.0, 1.0, 0.0), places[1]]), able=yes, hearing=yes)
+    resting = evolve(moved, hand=np.full((2, 3), (0.0, 0.2, 1.2)))
+    assert "hand" in broken(judge(resting, rules)), "it flew there itself"
+
+
+def test_what_began_while_nobody_could_help_it_is_judged_once_it_is_over() -> None:
+    rules = evolve(rules_of(CALM), ids=(1, 2))
+    places = np.array([[REST, place] for place in (APART, NEAR, NEAR, APART, NEAR)])
+    able = np.array([[True] * 2, [False] * 2, [True] * 2, [True] * 2, [True] * 2])
+    assert judge(flight(places, able), rules)["drones"].t == 4.0
+    assert not broken(judge(flight(places[:4], able[:4]), rules))
+    assert not broken(judge(flight(places[1:4], np.ones((3, 2), dtype=bool)), rules)), "it began there"
+
+
+@pytest.mark.parametrize(("peak", "fair"), [(0.3, True), (6.0, False)])
+def test_a_hand_is_judged_if_a_body_could_have_fled_from_it(peak: float, fair: bool) -> None:
+    """A body that does not move is hit by both; from the slow one it could have got away."""
+    t = np.arange(240) / 60.0
+    hand = np.zeros((240, 3)) + np.array([-0.6, 0.0, 1.0])
+    hand[:, 0] += np.clip(peak * (t - 0.5), 0.0, 0.6)
+    flown = flight(np.full((240, 1, 3), (0.0, 0.0, 1.0)), np.ones((240, 1), dtype=bool))
+    rules = evolve(rules_of(CALM), ids=(1,))
+    assert ("hand" in broken(judge(evolve(flown, t=t, hand=hand), rules))) is fair
+    walled = evolve(rules, fence=((-2.0, -0.1, 0.0), (0.1, 0.1, 2.0)))
+    assert "hand" not in broken(judge(evolve(flown, t=t, hand=hand), walled)), "it was trapped"
 
 
 def test_a_drone_that_is_cut_off_flies_on_by_its_own_ladder_and_lands() -> None:

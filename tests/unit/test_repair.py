@@ -173,7 +173,7 @@ def test_an_old_pose_is_told_and_a_lost_one_descends_open_loop_until_the_motors_
 
 
 def silent_ages(seconds: list[float], *overrides: str) -> list[tuple[int, int]]:
-    """Returns how many drones are avoided, and how many with a growing bubble, at some ages of drone 2."""
+    """Returns how many drones are avoided, and how many that do not yield, at some ages of drone 2."""
     scenario = load_scenario("rhombus", overrides)
     formation = build_formation(scenario)
     brain = Agent(scenario, formation, 1, agent_settings(scenario, formation, 1), epoch=0)
@@ -184,7 +184,7 @@ def silent_ages(seconds: list[float], *overrides: str) -> list[tuple[int, int]]:
     for age in seconds:
         now = round((1.0 + age) * NS_PER_S)
         found.append(brain._inputs(now, pose, 0.0, brain._look_around(now)))
-    return [(len(now.drones), len(now.silent)) for now in found]
+    return [(len(now.drones), sum(not each.yields for each in now.drones)) for now in found]
 
 
 def test_a_silent_body_is_kept_away_from_until_it_must_be_down() -> None:

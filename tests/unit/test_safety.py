@@ -12,7 +12,6 @@ import numpy.typing as npt
 import pytest
 from attrs import evolve
 
-from agents.control.avoidance import COLUMN_BUBBLE
 from deploy.lockstep.lockstep import fly_lockstep
 from shared.arrays import rest_of, weights_of
 from shared.config import load_scenario
@@ -26,7 +25,10 @@ pytestmark = pytest.mark.slow
 
 Vec = npt.NDArray[np.float64]
 
-KEEP = 0.30
+KEEP = 0.25
+"""To the hand, and a little more than is promised between two drones (docs/safety.md)."""
+PINNED = 0.24
+"""Between a wall of columns and those that follow."""
 HEADINGS = np.radians(np.arange(0, 360, 15))
 PEAKS = (0.3, 0.5, 0.75, 1.0, 1.25, 1.5)
 STROKES = (0.5, 1.0, 1.5, 2.0)
@@ -122,8 +124,8 @@ def test_a_formation_pushed_against_a_wall_of_columns(shape: str, law: str, angl
         worst = distances(scenario, iter(ticks))
         nearest = min(np.linalg.norm(tick.position[:, :, None, :2] - columns, axis=3).min() for tick in ticks)
         say(f"{shape}, {law}, {peak} m/s, columns {nearest:.3f} m", worst)
-        assert kept(worst)
-        assert nearest >= COLUMN_BUBBLE.radius - 0.02
+        assert kept(worst, drones=PINNED)
+        assert nearest >= 0.20
 
 
 @pytest.mark.parametrize(
@@ -160,7 +162,8 @@ def test_the_stable_law_stays_in_shape_at_any_size(shape: str, n: int) -> None:
         neighbour = max(neighbour, np.linalg.norm(relative, axis=2)[:, of_drones].max())
         last = max(last, np.linalg.norm(error, axis=2)[:, list(formation.levels[-1])].max())
     print(f"{shape} of {n}: neighbours {neighbour:.3f} m, last {last:.3f} m")
-    assert neighbour <= 0.35
+    # Who flees from the hand is out of place meanwhile.
+    assert neighbour <= 0.55
     assert last <= 0.60
 
 

@@ -46,6 +46,22 @@ def test_what_ships_passes_with_any_number_and_law(name: str) -> None:
         assert keys(name, "formation.n=2") == keys(name, "formation.n=32") == []
 
 
+def test_vehicles_that_cannot_keep_their_distances_in_the_shape_are_refused_with_numbers() -> None:
+    assert keys("line", "formation.spacing=0.305") == []
+    close = load_scenario("line", ["formation.spacing=0.305", "vehicles.all.body=crazyflie"])
+    (finding,) = check_scenario(close, build_formation(close))
+    assert finding.key == "formation"
+    assert "rest 0.305 m apart" in finding.what
+    assert "(crazyflie, crazyflie) keep 0.307 m" in finding.what
+
+
+def test_an_envelope_that_is_not_there_is_named_with_those_that_are() -> None:
+    scenario = load_scenario("line", ["vehicles.all.envelope=mine"])
+    (finding,) = check_scenario(scenario, build_formation(scenario))
+    assert finding.key == "vehicles"
+    assert "crazyflie, identified" in finding.what
+
+
 @pytest.mark.parametrize("name", SHIPPED)
 @pytest.mark.parametrize("more", [(), ("net.profile=radio",), ("net.router=tcp/10.0.0.1:7447",)])
 def test_what_the_launcher_resolves_passes_in_every_process(

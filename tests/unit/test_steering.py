@@ -8,12 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.control.avoidance import DRONE_BUBBLE, Encounter
+from agents.control.safety.encounter import Clearance, Encounter, drone_heard, walker_seen
+from agents.control.safety.motion import Motion, start_motion
 from agents.control.steering import (
-    ESCAPE_ACCELERATION,
     HAND_SPEED_FACTOR,
     LONGEST_STEP,
-    Bystander,
     Steered,
     SteeringSettings,
     Surroundings,
@@ -21,7 +20,7 @@ from agents.control.steering import (
 )
 from agents.control.trajectory import Trajectory, start_at
 from agents.control.vectors import ORIGIN, Vector, distance, norm
-from agents.settings import steering_settings
+from agents.settings import clearances, steering_settings, widest
 from shared.config import load_scenario
 from shared.formation import build_formation
 from tests.values import fields
@@ -44,52 +43,69 @@ def box(limit: float) -> st.SearchStrategy[Vector]:
     return st.tuples(*[st.floats(-limit, limit)] * 3)
 
 
-PLACES, SPEEDS = box(2.0), box(1.5)
-ENCOUNTERS = st.builds(Encounter, *[st.floats(-0.8, 0.8)] * 4) | st.builds(
-    Encounter, *[st.floats(-3.0, 3.0)] * 4
-)
-TRAJECTORIES = st.builds(Trajectory, PLACES, box(0.5), box(0.5), PLACES) | PLACES.map(start_at)
-AROUND = st.builds(
-    Surroundings,
-    PLACES,
-    SPEEDS,
-    st.lists(ENCOUNTERS, max_size=5),
-    st.lists(st.builds(Bystander, *[st.floats(-0.8, 0.8)] * 2, st.floats(0.35, 0.6)), max_size=2),
-    st.lists(ENCOUNTERS, max_size=1),
-    st.floats(0.0, 2.0),
-)
-STEPS = st.floats(1e-4, LONGEST_STEP)
-
-
 @functools.cache
 def settings(law: str, rules: str) -> SteeringSettings:
     scenario = load_scenario("rhombus", [f"swarm.law={law}", *RULES[rules]])
     return steering_settings(scenario, build_formation(scenario), 1)
 
 
+@functools.cache
+def clearance() -> Clearance:
+    scenario = load_scenario("rhombus")
+    return widest(clearances(scenario, build_formation(scenario), 1))
+
+
+def drone(point: Vector, pace: Vector = ORIGIN) -> Encounter:
+    return drone_heard(point, pace, ORIGIN, 0.0, clearance(), yields=True)
+
+
+def hand(point: Vector, pace: Vector = ORIGIN) -> Encounter:
+    return walker_seen(point, pace, 0.0, 0.0, settings("paper", "free").safety.hand)
+
+
+PLACES, SPEEDS = box(2.0), box(1.5)
+NEAR, ANYWHERE = (box(0.8), box(0.8)), (box(3.0), box(3.0))
+DRONES = st.builds(drone, *NEAR) | st.builds(drone, *ANYWHERE)
+HANDS = st.builds(hand, *NEAR) | st.builds(hand, *ANYWHERE)
+TRAJECTORIES = st.builds(Trajectory, PLACES, box(0.5), box(0.5), PLACES) | PLACES.map(start_at)
+MOTIONS = st.builds(start_motion, PLACES, SPEEDS, st.just(0.0))
+AROUND = st.builds(Surroundings, st.lists(DRONES, max_size=5), st.lists(HANDS, max_size=1), st.floats(0.0, 2.0))
+STEPS = st.floats(1e-4, LONGEST_STEP)
+
+
 @EVERY
-@given(TRAJECTORIES, PLACES, SPEEDS, AROUND, STEPS | st.floats(1e-9, 30.0))
+@given(TRAJECTORIES, MOTIONS, PLACES, SPEEDS, AROUND, STEPS | st.floats(1e-9, 30.0), st.booleans())
 def test_no_step_breaks_the_limits(
-    law: str, rules: str, before: Trajectory, goal: Vector, velocity: Vector, around: Surroundings, dt: float
+    law: str,
+    rules: str,
+    before: Trajectory,
+    motion: Motion,
+    goal: Vector,
+    velocity: Vector,
+    around: Surroundings,
+    dt: float,
+    floor: bool,
 ) -> None:
     rule = settings(law, rules)
-    steered = steer(before, goal, velocity, around, rule, dt)
-    now, hardest = (
-        steered.trajectory,
-        rule.acceleration * ESCAPE_ACCELERATION * max(min(dt, LONGEST_STEP), 1e-4),
-    )
-    assert (
-        norm(now.velocity)
-        <= max(rule.speed, HAND_SPEED_FACTOR * around.hand_speed, norm(before.velocity)) + 1e-9
-    )
+    steered = steer(before, motion, goal, velocity, around, rule, dt, floor=floor)
+    now, guarded = steered.trajectory, steered.guarded
+    hardest = rule.acceleration * max(min(dt, LONGEST_STEP), 1e-4)
+    for point in (guarded.setpoint, now.goal):
+        assert all(low <= x <= high for low, x, high in zip(rule.low, point, rule.high, strict=True))
+    if guarded.planar or guarded.upright:
+        assert all(map(math.isfinite, (*now.point, *now.velocity, *now.lead)))
+        return
+    fastest = max(rule.speed, HAND_SPEED_FACTOR * around.hand_speed, norm(before.velocity))
+    assert norm(now.velocity) <= fastest + 1e-9
     assert distance(now.velocity, before.velocity) <= hardest + 1e-9
     assert distance(now.lead, before.lead) <= hardest + 1e-9
-    for point in (now.point, steered.setpoint, now.goal):
-        assert all(low <= x <= high for low, x, high in zip(rule.low, point, rule.high, strict=True))
+    assert all(low <= x <= high for low, x, high in zip(rule.low, now.point, rule.high, strict=True))
 
 
-def alone(position: Vector, *others: Encounter, hand: Encounter | None = None) -> Surroundings:
-    return Surroundings(position, ORIGIN, [*others], [], [hand] if hand else [], 0.0)
+def rested(
+    position: Vector, *others: Encounter, hands: tuple[Encounter, ...] = ()
+) -> tuple[Motion, Surroundings]:
+    return start_motion(position, ORIGIN, 0.0), Surroundings([*others], [*hands], 0.0)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -98,8 +114,10 @@ def test_with_nobody_in_the_way_a_goal_in_reach_is_reached_at_once(
     law: str, start: Vector, way: Vector
 ) -> None:
     (x, y, z), (u, v, w) = start, way
-    goal = (x + 0.04 * u, y + 0.04 * v, abs(z + 0.04 * w))
-    steered = steer(start_at((x, y, abs(z))), goal, ORIGIN, alone(start), settings(law, "free"), TICK)
+    here = (x, y, 0.3 + abs(z))
+    goal = (x + 0.04 * u, y + 0.04 * v, 0.3 + abs(z + 0.04 * w))
+    motion, around = rested(here)
+    steered = steer(start_at(here), motion, goal, ORIGIN, around, settings(law, "free"), TICK, floor=True)
     assert steered.trajectory.point == pytest.approx(goal, abs=1e-9)
     assert not steered.avoiding
     assert not steered.fenced
@@ -111,45 +129,47 @@ def test_the_stable_law_leads_by_the_goals_velocity_and_the_papers_not_at_all(ve
     for law, share in (("stable", 1.0), ("paper", 0.0)):
         rule, now = settings(law, "free"), Trajectory(point, ORIGIN, ORIGIN, point)
         for _ in range(60):
-            steered = steer(now, point, velocity, alone(point), rule, TICK)
+            motion, around = rested(point)
+            steered = steer(now, motion, point, velocity, around, rule, TICK, floor=True)
             now = steered.trajectory
         leading = [x + rule.tau * share * u for x, u in zip(point, velocity, strict=True)]
-        assert steered.setpoint == pytest.approx(leading, abs=1e-9)
+        assert steered.guarded.setpoint == pytest.approx(leading, abs=1e-9)
 
 
 @EVERY
 @given(st.floats(-math.pi, math.pi), st.booleans())
 def test_who_comes_near_is_left_and_reported(law: str, rules: str, heading: float, is_hand: bool) -> None:
     here = (0.0, 0.0, 0.6)
-    other = Encounter(0.25 * math.cos(heading), 0.25 * math.sin(heading), 0.0, 0.0)
-    around = alone(here, hand=other) if is_hand else alone(here, other)
-    steered = steer(start_at(here), here, ORIGIN, around, settings(law, rules), TICK)
-    x, y, _ = steered.setpoint
+    there = (0.25 * math.cos(heading), 0.25 * math.sin(heading), 0.6)
+    motion, around = rested(here, hands=(hand(there),)) if is_hand else rested(here, drone(there))
+    steered = steer(start_at(here), motion, here, ORIGIN, around, settings(law, rules), TICK, floor=True)
     assert steered.avoiding
     if rules == "free":
-        assert math.hypot(x - other.x, y - other.y) > 0.25
+        assert math.dist(steered.guarded.setpoint, there) > 0.25
 
 
 def same(one: Steered, other: Steered) -> bool:
-    return fields(one.trajectory) == fields(other.trajectory) and one.setpoint == other.setpoint
+    return (
+        fields(one.trajectory) == fields(other.trajectory)
+        and one.guarded.setpoint == other.guarded.setpoint
+        and one.guarded.kept == other.guarded.kept
+    )
 
 
 @pytest.mark.parametrize("law", LAWS)
-@given(TRAJECTORIES, PLACES, SPEEDS, AROUND)
+@given(TRAJECTORIES, MOTIONS, PLACES, SPEEDS, AROUND)
 def test_who_is_far_away_changes_nothing(
-    law: str, before: Trajectory, goal: Vector, velocity: Vector, around: Surroundings
+    law: str, before: Trajectory, motion: Motion, goal: Vector, velocity: Vector, around: Surroundings
 ) -> None:
     """A flock leaves them out."""
-    x, y, _ = around.position
-    reach = (
-        DRONE_BUBBLE.radius
-        + DRONE_BUBBLE.lead * (norm(around.velocity) + 3.0)
-        + distance(before.point, around.position)
-    )
-    far = Encounter(x + reach + 0.5, y, -2.0, 0.5)
-    seen = fields(around)
-    crowded = Surroundings(**{**seen, "drones": [*around.drones, far]})
     rule = settings(law, "free")
-    assert same(
-        steer(before, goal, velocity, around, rule, TICK), steer(before, goal, velocity, crowded, rule, TICK)
+    safety, closing = rule.safety, abs(motion.x.velocity) + abs(motion.y.velocity) + 2.0
+    needed = safety.horizontal.acceleration / safety.planar.rate + 2.0 * (closing + clearance().surprise)
+    reach = clearance().distance + safety.planar.gap_for(needed) + distance(before.point, goal)
+    far = drone((motion.x.position + reach + 0.5, motion.y.position, motion.z.position), (-2.0, 0.0, 0.0))
+    crowded = Surroundings([*around.drones, far], around.walkers, around.hand_speed)
+    one, other = (
+        steer(before, motion, goal, velocity, seen, rule, TICK, floor=True) for seen in (around, crowded)
     )
+    if one.guarded.kept:
+        assert same(one, other)

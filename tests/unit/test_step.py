@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.agent import Agent
-from agents.control.avoidance import Encounter
 from agents.control.hand import HandInput
 from agents.control.repair import EXTRAPOLATION, Reference
-from agents.control.steering import Bystander
+from agents.control.safety.encounter import Clearance, Encounter, drone_heard
 from agents.control.step import Inputs, Output, Settings, State, start, step
 from agents.settings import agent_settings
 from agents.vehicles.base import Pose
@@ -30,6 +29,7 @@ from tests.values import replace, vector
 Triple = Sequence[float]
 
 TICK = 1.0 / 60.0
+CLEARANCE = Clearance(0.3, 1.0, 3.0)
 NEVER = math.inf
 REST = {1: (-0.5, 0.0, 1.2), 2: (-1.0, 0.5, 1.2), 3: (-1.0, -0.5, 1.2), 4: (-1.5, 0.0, 1.2)}
 """The rhombus in the air with the hand at (0, 0, 1.2)."""
@@ -53,7 +53,7 @@ def reference(point: Triple, **changes: Any) -> Reference:
 
 
 def drones(*places: Triple) -> list[Encounter]:
-    return [Encounter(x, y, 0.0, 0.0) for x, y, _ in places]
+    return [drone_heard(vector(place), ORIGIN, ORIGIN, 0.0, CLEARANCE, yields=True) for place in places]
 
 
 def said(output: Output) -> Flag:
@@ -73,7 +73,7 @@ def inputs(drone: int, **changes: Any) -> Inputs:
         hand_fresh=True,
         references=[reference(REST[other]) for other in {1: (), 2: (1,), 3: (1,), 4: (2, 3)}[drone]],
         drones=drones(),
-        silent=[],
+        obstacles=[],
         missed=False,
         awaiting=False,
         alone=False,
@@ -400,7 +400,7 @@ moments = st.fixed_dictionaries(
         "hand_fresh": st.booleans(),
         "references": st.lists(references, min_size=3, max_size=3),
         "drones": st.lists(places, max_size=3).map(lambda found: drones(*found)),
-        "silent": st.lists(st.builds(Bystander, coordinates, coordinates, st.floats(0.35, 0.6)), max_size=2),
+        "obstacles": st.just([]),
         "missed": st.booleans(),
         "awaiting": st.booleans(),
         "alone": st.booleans(),

@@ -25,6 +25,7 @@ from deploy.falsify.swarm import Flown, Swarm, _start, prepare
 from shared.clock import NS_PER_S
 from shared.codec import MAX_PAYLOAD, decode, encode
 from shared.config import load_scenario
+from shared.envelope import envelope_of
 from shared.errors import DeviceError
 from shared.formation import build_formation
 from shared.memory_bus import MemoryBus, MemoryNetwork
@@ -295,6 +296,7 @@ def test_a_held_drone_is_heard_by_everybody_who_comes_near(weather: Weather) -> 
         able=columns[1],
         hearing=columns[2],
         guided=columns[3],
+        vehicles=tuple(envelope_of(scenario, drone).horizontal for drone in formation.ids),
     )
     rules: Rules = referee_rules(scenario, formation, formation.ids)
     assert judge(flown, rules)["drones"].value >= 0.12

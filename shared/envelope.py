@@ -1,0 +1,152 @@
+"""What a vehicle can do: its measured envelope, a TOML file per type, and the margins that follow from it.
+
+`agents.control.safety.response` has the model whose parameters these are, docs/safety.md the theorem that makes
+margins of them. `swarmtouch vehicle identify` measures them.
+"""
+
+import functools
+from pathlib import Path
+from typing import Any
+
+from attrs import Attribute, field, frozen
+
+from shared.config import structure
+from shared.errors import ConfigError
+from shared.scenario import Scenario
+from shared.toml_text import read_toml
+from shared.vehicles import vehicle_settings
+
+ENVELOPES = Path(__file__).resolve().parent.parent / "agents" / "vehicles" / "envelopes"
+
+BODY = 0.06
+"""Half the distance at which two bodies touch, m: a Crazyflie's arm (0.046) and its propeller."""
+KEEP_DRONE = 0.20
+"""Distance that the bodies of two drones keep, m."""
+KEEP_HAND = 0.25
+"""Distance that a body keeps from a hand, m."""
+BRAKE_SHARE = 0.6
+"""Share of the acceleration that barriers are made for; the rest is for errors, and for who comes second."""
+MISSION_SHARE = 0.7
+"""Share of the acceleration that the mission may use."""
+REACTION = 0.15
+"""Time constant of the barriers of a vehicle that answers at once, s: sensing, a control step, a message."""
+
+
+def _positive(_: Any, attribute: "Attribute[Any]", value: float) -> None:
+    if not value > 0:
+        raise ValueError(f"{attribute.name} must be > 0, not {value!r}")
+
+
+def _not_negative(_: Any, attribute: "Attribute[Any]", value: float) -> None:
+    if not value >= 0:
+        raise ValueError(f"{attribute.name} must be >= 0, not {value!r}")
+
+
+@frozen(kw_only=True)
+class AxisEnvelope:
+    """One axis of a vehicle under its own position controller.
+
+    Attributes:
+        stiffness: Acceleration per metre between body and set-point, 1/s^2.
+        damping: Acceleration against the body's velocity, 1/s.
+        feed: Acceleration with the set-point's velocity, 1/s.
+        lag: From what is asked for to what happens, s.
+        acceleration: Largest that can be asked for, m/s^2.
+        error: Largest acceleration that model and observer leave over, m/s^2.
+    """
+
+    stiffness: float = field(validator=_positive)
+    damping: float = field(validator=_not_negative)
+    feed: float = field(validator=_not_negative)
+    lag: float = field(validator=_not_negative)
+    acceleration: float = field(validator=_positive)
+    error: float = field(validator=_not_negative)
+
+    @property
+    def brake(self) -> float:
+        """Deceleration that can be relied on, m/s^2."""
+        return BRAKE_SHARE * self.acceleration
+
+    @property
+    def rate(self) -> float:
+        """How fast barriers may be approached, 1/s."""
+        return 1.0 / (REACTION + self.lag)
+
+    @property
+    def tube(self) -> float:
+        """How far the body may be from where a barrier lets it rest, m."""
+        return self.error / self.rate**2
+
+    @property
+    def behind(self) -> float:
+        """How far, in time, the body is behind a set-point that moves evenly, s; an integrator not counted."""
+        return (self.damping - self.feed) / self.stiffness
+
+
+@frozen(kw_only=True)
+class Downwash:
+    """The air below a drone, which carries nobody.
+
+    Attributes:
+        radius: m.
+        height: m.
+    """
+
+    radius: float = field(default=0.3, validator=_not_negative)
+    height: float = field(default=1.0, validator=_not_negative)
+
+
+@frozen(kw_only=True)
+class Envelope:
+    """One type of vehicle.
+
+    Attributes:
+        about: One line for people.
+        tau: By what time the set-point leads, s.
+        horizontal: Both horizontal axes.
+        vertical: The vertical one.
+        downwash: The air below it.
+    """
+
+    about: str
+    tau: float = field(validator=_not_negative)
+    horizontal: AxisEnvelope
+    vertical: AxisEnvelope
+    downwash: Downwash = Downwash()
+
+    def clearance(self, other: "Envelope") -> float:
+        """Returns the horizontal distance that two drones keep between their points ahead, m.
+
+        Both may be off by their tubes, and nobody flies in the air below anybody.
+        """
+        bodies = KEEP_DRONE + self.horizontal.tube + other.horizontal.tube
+        return max(bodies, self.downwash.radius, other.downwash.radius)
+
+
+def envelope_of(scenario: Scenario, drone: int) -> Envelope:
+    """Returns the envelope of one drone's vehicle: the file that the scenario names, or that of its body.
+
+    Raises:
+        ConfigError: There is no such file, or something is wrong with it.
+    """
+    settings = vehicle_settings(scenario, drone)
+    return load_envelope(settings.envelope or str(settings.body))
+
+
+@functools.cache
+def load_envelope(source: str) -> Envelope:
+    """Reads an envelope.
+
+    Args:
+        source: Path of a TOML file, or the bare name of one that ships (`identified`).
+
+    Raises:
+        ConfigError: There is none, or something is wrong with it.
+    """
+    path = ENVELOPES / f"{source}.toml"
+    if Path(source).suffix == ".toml":
+        path = Path(source)
+    elif not path.is_file():
+        shipped = ", ".join(sorted(each.stem for each in ENVELOPES.glob("*.toml")))
+        raise ConfigError(f"{source}: no such envelope of a vehicle; those that ship: {shipped}")
+    return structure(read_toml(path, "`swarmtouch vehicle identify` makes one"), Envelope, str(path))
