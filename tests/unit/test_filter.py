@@ -302,6 +302,24 @@ def test_who_crosses_above_or_below_is_let_pass(body: str) -> None:
     assert drone.at[2] == pytest.approx(0.5, abs=0.05)
 
 
+@EVERY_BODY
+@given(height=st.floats(0.0, 0.9), aside=st.floats(-0.2, 0.2), speed=st.floats(0.3, 0.8))
+@hypothesis(max_examples=10, deadline=None)
+def test_two_that_cross_do_so_outside_each_others_air(
+    body: str, height: float, aside: float, speed: float
+) -> None:
+    """They meet head on, one above the other: they pass aside, or keep the height of the downwash."""
+    kept = clearance(body)
+    one, other = Drone(body, (-1.2, 0.0, 1.2)), Drone(body, (1.2, aside, 1.2 + height))
+    for _ in range(420):
+        said, heard = one.said(), other.said()
+        one.fly((speed, 0.0, 0.0), [drone_heard(*heard, 0.0, kept, yields=True)])
+        other.fly((-speed, 0.0, 0.0), [drone_heard(*said, 0.0, kept, yields=True)])
+        level, apart = abs(one.at[2] - other.at[2]), planar(one.at, other.at)
+        assert apart >= 0.20
+        assert apart >= 0.27 or level >= 0.95
+
+
 @given(age=st.floats(0.1, 10.0), speed=st.floats(0.1, 1.0))
 def test_a_silent_body_may_be_anywhere_on_its_way(age: float, speed: float) -> None:
     """Whoever stands where it could have come to by now has to leave, and where it was as well."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from agents.agent import Agent
+from agents.settings import agent_settings
+from agents.vehicles.base import Pose
 from agents.vehicles.world.crowd import Crowd
 from agents.vehicles.world.referee import RefereeState, Rules, report, update
 from agents.vehicles.world.walkers import VALID_S, obstacles_at, walk
@@ -21,7 +25,7 @@ from shared.cylinders import Cylinder, columns_of, cylinder_of
 from shared.errors import ConfigError, DecodeError
 from shared.formation import build_formation
 from shared.memory_bus import MemoryBus, MemoryNetwork
-from shared.messages import ORIGIN, ObstacleState, Vector
+from shared.messages import ORIGIN, DroneState, Flag, ObstacleState, Vector
 from shared.net.access import writes
 from shared.nodes import WORLD, dials, drone_node, endpoint
 from shared.obstacle_watch import MOST_OBSTACLES, ObstacleWatch
@@ -164,6 +168,31 @@ def test_columns_have_a_radius_and_a_height_of_their_own() -> None:
     assert low == Cylinder(2.0, 2.0, 0.4, high=1.0)
     assert low.gap((2.0, 2.0, 1.5)) == pytest.approx(0.5)
     assert low.gap((2.6, 2.0, 0.5)) == pytest.approx(0.2)
+
+
+def met(age: float, **said: Any) -> DroneState:
+    """Returns what a drone that hovers at (-0.5, 0, 1.2) does, an age after somebody on foot was heard of."""
+    scenario = load_scenario("rhombus")
+    formation = build_formation(scenario)
+    brain = Agent(scenario, formation, 1, agent_settings(scenario, formation, 1), epoch=T0)
+    pose = Pose((-0.5, 0.0, 1.2), ORIGIN, 0.0, 1.0, airborne=True, seq=1)
+    brain.step(T0, pose, 0.0)
+    brain.receive({OBSTACLE.key(id=1): [Arrival(encode(replace(obstacle(), **said)), T0)]})
+    return brain.step(T0 + round(age * NS_PER_S) + 16_000_000, pose, 0.0)
+
+
+def test_a_drone_leaves_the_way_of_whoever_walks() -> None:
+    state = met(0.02, position=(-1.3, 0.0, 0.0), velocity=(1.2, 0.0, 0.0))
+    assert Flag.AVOIDING in state.flags
+    assert state.asked[0] > 0.5
+    above = met(0.02, position=(-1.3, 0.0, 0.0), velocity=(1.2, 0.0, 0.0), height=0.5)
+    assert Flag.AVOIDING not in above.flags, "it passes below"
+
+
+def test_who_walked_and_is_not_heard_is_avoided_where_he_was_and_on_his_way_until_it_is_too_old() -> None:
+    for place in ((-0.8, 0.0, 0.0), (-1.3, 0.0, 0.0)):
+        assert Flag.AVOIDING in met(VALID_S - 0.1, position=place, velocity=(0.8, 0.0, 0.0)).flags
+        assert Flag.AVOIDING not in met(VALID_S + 0.1, position=place, velocity=(0.8, 0.0, 0.0)).flags
 
 
 axes = st.floats(-2.0, 2.0)
