@@ -71,6 +71,8 @@ def _begin(case: Case, rng: Rng) -> Case:
 
 
 def _fault(case: Case, rng: Rng) -> Case:
+    if not case.faults:
+        return case
     at = int(rng.integers(len(case.faults)))
     old = case.faults[at]
     start = float(max(0.0, old.start + rng.normal(0.0, 0.5)))

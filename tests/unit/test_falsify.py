@@ -12,6 +12,7 @@ from agents.vehicles.world.referee import Rules
 from agents.vehicles.world.setup import referee_rules
 from deploy.cli import main
 from deploy.falsify.case import Case, Fault, FaultKind, Stroke, Weather, Wished
+from deploy.falsify.change import change
 from deploy.falsify.draw import FASTEST_HAND, Plan, draw_case
 from deploy.falsify.hand import poses, samples, tracked
 from deploy.falsify.judge import CLASSES, broken, judge
@@ -246,6 +247,17 @@ def test_drawn_cases_are_within_what_was_planned() -> None:
     assert max(stroke.peak for case in cases for stroke in case.strokes) <= FASTEST_HAND
     calm = draw_case(Plan(scenarios=("rhombus",), faults=False, weather=False), rng)
     assert (calm.faults, calm.wishes, calm.weather) == ((), (), Weather())
+
+
+def test_a_case_is_changed_again_and_again_whatever_it_has_become() -> None:
+    plan, rng = Plan(scenarios=("rhombus",)), np.random.default_rng(1)
+    case = draw_case(plan, rng)
+    seen = set()
+    for _ in range(300):
+        case = change(case, plan, rng)
+        seen.add(len(case.faults))
+    assert 0 in seen, "none are left at times"
+    assert len(seen) > 1
 
 
 def test_the_same_seed_finds_the_same_worst() -> None:
