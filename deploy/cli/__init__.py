@@ -22,6 +22,7 @@ COMMANDS = {
     "bench": "measure speed and cost against the floor of the transport",
     "sim": "fly a scenario on a virtual clock in one process",
     "falsify": "look for the flight in which a scenario comes nearest to a collision",
+    "vehicle": "measure what a vehicle can do",
     "net": "keys of a swarm and the network configuration of its nodes",
     "scenarios": "list the scenarios that ship",
 }

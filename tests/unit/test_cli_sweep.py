@@ -59,6 +59,7 @@ EXAMPLES = {
     "nodes": "drone/1",
     "id": "1",
     "run_dir": "out",
+    "source": "sim:identified",
 }
 """Of each argument that must be given, a good one."""
 WORK = (
@@ -69,6 +70,7 @@ WORK = (
     "deploy.bench.start.measure",
     "deploy.doctor.examine.examine",
     "deploy.falsify.search.search",
+    "deploy.vehicle.identify.excited",
 )
 """Where commands begin to work."""
 

@@ -1,0 +1,1 @@
+"""Vehicles: what one can do, measured (`swarmtouch vehicle`)."""
