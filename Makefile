@@ -29,13 +29,15 @@ env: $(DEVELOPMENT)  ## set up everything that developing needs in .venv/
 compile: $(RUNTIME)  ## compile the control law to native code; demo, env and test do it where there is a C compiler
 	@$(BIN)/python -m deploy.compile.toolchain && $(COMPILE)
 
-# Flights with real processes want the machine to themselves; everything else shares it. What a busy machine spoils
+# What measures flights of real processes wants the machine to itself; everything else shares it. What a busy machine spoils
 # is flown again, twice at most and by name in the output: a defect spoils every flight, noise one.
+# The pure form skips the long flights: tests/unit/test_forms.py shows that both forms fly them to the same bits.
 test: lint  ## everything CI runs: format, lint, types, import contracts, all tests
 	@$(WHERE_POSSIBLE)
 	$(BIN)/pytest --numprocesses auto tests/unit tests/contract tests/replay
-	SWARMTOUCH_PURE=1 $(BIN)/pytest --numprocesses auto -m law tests/unit tests/contract tests/replay
-	$(BIN)/pytest --reruns 2 -raR tests/integration
+	SWARMTOUCH_PURE=1 $(BIN)/pytest --numprocesses auto -m "law and not slow" tests/unit tests/contract tests/replay
+	$(BIN)/pytest --numprocesses 2 --dist loadgroup --reruns 2 -raR -m parallel tests/integration
+	$(BIN)/pytest --reruns 2 -raR -m "not parallel" tests/integration
 
 check: lint  ## the quick gate: format, lint, types, import contracts, unit tests
 	$(BIN)/pytest --numprocesses auto -m "not slow" tests/unit

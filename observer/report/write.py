@@ -64,6 +64,7 @@ def _write_figure(drawing: Drawing, flights: Sequence[FlightRecord], folder: Pat
         figure = Figure(figsize=drawing.size, layout="constrained")
         drawing.draw(figure, flights)
         figure.savefig(folder / f"{drawing.name}.png", dpi=_DPI)
+        figure.set_layout_engine("none")  # all is in its place now, and finding that takes as long as drawing
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
     svg = text.getvalue()

@@ -25,7 +25,7 @@ from shared.topics import DRONE_STATE, STATUS
 from shared.transport import Inbox
 from tests.integration.bridged import BridgeListener
 
-pytestmark = pytest.mark.timeout(90)
+pytestmark = [pytest.mark.parallel, pytest.mark.timeout(90)]
 
 DEADLINE_S = 30.0
 FORMATION = build_formation(load_scenario("rhombus"))

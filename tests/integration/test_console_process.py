@@ -16,6 +16,8 @@ import pytest
 from observer.console.arguments import TOKEN_VARIABLE
 from tests.integration.console_page import open_page
 
+pytestmark = pytest.mark.parallel
+
 DEADLINE_S = 20.0
 
 

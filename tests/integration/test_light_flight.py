@@ -9,6 +9,8 @@ from deploy.launcher.process_table import ProcessRow
 from shared.scenario_check.checked import SUFFIX
 from tests.integration.swarm import Swarm
 
+pytestmark = pytest.mark.parallel
+
 SPY = Path(__file__).parents[1] / "loaded_modules.py"
 FLYING = ("agents", "human_relay")
 HEAVY = {"numpy", "scipy", "cattrs", "rich", "tomli_w", "mcap", "matplotlib", "cryptography"}

@@ -18,7 +18,11 @@ from shared.formation import build_formation
 from shared.net.keyring import Keyring
 from shared.nodes import all_nodes
 from tests.integration.swarm import Launched, launched
-from tests.integration.test_up import children_of, pytestmark  # noqa: F401  as there: Linux only, and a timeout
+from tests.integration.test_up import children_of
+from tests.integration.test_up import pytestmark as of_flights
+
+# Consoles look for a free port near their own, so one starts at a time.
+pytestmark = [*of_flights, pytest.mark.xdist_group("console")]
 
 TOKEN = "a token that nobody else has"  # noqa: S105  of the test
 FLOWN_S = 2.0

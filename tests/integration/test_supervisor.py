@@ -13,6 +13,8 @@ import pytest
 from deploy.launcher.supervisor import FIRST_BACKOFF_S, LONGEST_BACKOFF_S, Child, Supervisor
 from tests.integration.children import PATIENT, STUBBORN, Exits, is_running, log_of, row, until
 
+pytestmark = pytest.mark.parallel
+
 
 def test_a_process_that_ends_is_started_again_with_growing_delays(tmp_path: Path) -> None:
     exits = Exits()

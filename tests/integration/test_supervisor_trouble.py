@@ -12,6 +12,8 @@ from deploy.launcher.supervisor import AT_ONCE, FIRST_BACKOFF_S, Child, Supervis
 from shared.process import EXIT_REFUSED
 from tests.integration.children import PATIENT, Exits, log_of, row, until
 
+pytestmark = pytest.mark.parallel
+
 
 def test_orders_given_before_the_start_reach_the_process(tmp_path: Path) -> None:
     async def scenario() -> None:

@@ -20,6 +20,7 @@ from shared.config import load_scenario
 from shared.process import LAUNCHER_PID
 
 pytestmark = [
+    pytest.mark.parallel,
     pytest.mark.timeout(120),
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in Linux's /proc"),
 ]

@@ -13,6 +13,8 @@ import pytest
 
 from agents.vehicles import open_vehicle
 
+pytestmark = pytest.mark.parallel
+
 DEADLINE_S = 30.0
 
 

@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from deploy.cli import main
 from observer.report.figures import FIGURES
 from observer.report.figures.base import snapshots
+from observer.report.page import page as page_of
 from observer.report.record import ROW_HZ, FlightRecord, Played, hold, mapped_hand, resample
 from observer.report.source import open_record
 from observer.report.tables import REACTION_TIMES, areas, fleet_row, reactions
@@ -147,7 +148,8 @@ def test_what_a_flight_lacks_is_said_instead_of_drawn(tmp_path: Path) -> None:
     assert text.count("<svg") == len(FIGURES) - 2
 
 
-def test_several_flights_have_a_row_each_and_a_mean(tmp_path: Path) -> None:
+def test_several_flights_have_a_row_each_and_a_mean(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("observer.report.write.FIGURES", FIGURES[:1])
     slow = evolve(STRAIGHT, position=STRAIGHT.position * 0.5)  # of the same name, from another folder
     text = write_report([STRAIGHT, slow], tmp_path).read_text()
     assert f"<td>{SPEED * T[-1] * 0.75:.4f}</td>" in text
@@ -234,8 +236,10 @@ def test_a_trace_becomes_a_record_of_the_time_in_formation(tmp_path: Path) -> No
     assert played.length == pytest.approx(0.3)
 
 
-@pytest.mark.parametrize("name", ["$\\frac{$", "a\0b", "<b>&", "_x", "模式", "x" * 200, "=1+1", "\x1b[2J"])
-def test_a_name_is_shown_as_it_is_whatever_it_is(tmp_path: Path, name: str) -> None:
+NAMES = ("$\\frac{$", "a\0b", "<b>&", "_x", "模式", "x" * 200, "=1+1", "\x1b[2J")
+
+
+def test_names_are_shown_as_they_are_whatever_they_are(tmp_path: Path) -> None:
     felt = [
         PatternEvent(
             epoch=1,
@@ -247,19 +251,23 @@ def test_a_name_is_shown_as_it_is_whatever_it_is(tmp_path: Path, name: str) -> N
             started_ns=T0 + 50 * TICK,
             finished_ns=T0 + 60 * TICK,
         )
-        for seq, pattern in enumerate([name, *(f"made up {n}" for n in range(200))])
+        for seq, pattern in enumerate([*NAMES, *(f"made up {n}" for n in range(200))])
     ]
-    folder = tmp_path / name.replace("\0", "").replace("/", "")
-    record = open_record(write_trace(folder, [*fly(300), *felt]))
-    page = write_report([evolve(record, name=name)], tmp_path / "report")
-    text = page.read_text(encoding="utf-8")
-    assert "\0" not in text
-    assert "\x1b" not in text
-    ElementTree.parse(page.parent / "patterns.svg")  # noqa: S314  our own file
-    with (page.parent / "patterns.csv").open(newline="", encoding="utf-8") as file:
-        patterns = [row["pattern"] for row in csv.DictReader(file)]
-    assert len(patterns) == 201
-    assert not any(pattern.startswith("=") for pattern in patterns)
+    messages = [*fly(300), *felt]
+    flights = [open_record(write_trace(tmp_path / name.replace("\0", ""), messages)) for name in NAMES]
+    named = [evolve(record, name=name) for record, name in zip(flights, NAMES, strict=True)]
+    report = write_report(named, tmp_path / "report")
+    pages = [report.read_text(encoding="utf-8"), *(page_of([record], {}, []) for record in named)]
+    for text in pages:
+        assert "\0" not in text
+        assert "\x1b" not in text
+        assert "<b>&" not in text
+    ElementTree.parse(report.parent / "patterns.svg")  # noqa: S314  our own file
+    for table, column, rows in (("patterns", "pattern", len(felt)), ("fleet", "flight", len(NAMES))):
+        with (report.parent / f"{table}.csv").open(newline="", encoding="utf-8") as file:
+            names = [row[column] for row in csv.DictReader(file)]
+        assert len(names) == rows
+        assert not any(name.startswith("=") for name in names)
 
 
 def test_what_cannot_be_reported_is_refused_with_the_reason(
