@@ -36,7 +36,7 @@ test: lint  ## everything CI runs: format, lint, types, import contracts, all te
 	@$(WHERE_POSSIBLE)
 	$(BIN)/pytest --numprocesses auto tests/unit tests/contract tests/replay
 	SWARMTOUCH_PURE=1 $(BIN)/pytest --numprocesses auto -m "law and not slow" tests/unit tests/contract tests/replay
-	$(BIN)/pytest --numprocesses 2 --dist loadgroup --reruns 2 -raR -m parallel tests/integration
+	$(BIN)/pytest --numprocesses 2 --reruns 2 -raR -m parallel tests/integration
 	$(BIN)/pytest --reruns 2 -raR -m "not parallel" tests/integration
 
 check: lint  ## the quick gate: format, lint, types, import contracts, unit tests

@@ -1,5 +1,6 @@
 """Builds firmware, fuzzer and simulated chip once; without the toolchain tests skip and say what is missing."""
 
+import fcntl
 import os
 import shutil
 import subprocess
@@ -31,7 +32,12 @@ def built() -> str:
     if missing:
         say = pytest.fail if "CI" in os.environ else pytest.skip
         say(f"on Debian: apt-get install --no-install-recommends {' '.join(missing)}")
-    make = subprocess.run([str(NEEDED["make"]), "chip"], cwd=ROOT, capture_output=True, text=True, check=False)
+    folder = ROOT / "build"
+    folder.mkdir(exist_ok=True)
+    with (folder / "chip.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # of the workers of one run the first builds
+        command = [str(NEEDED["make"]), "chip"]
+        make = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert make.returncode == 0, make.stderr
     return make.stdout
 

@@ -11,7 +11,7 @@ from glove_bridge.protocol import USB_DEADMAN_MS, Ack, Hello, Ping, Set, Status
 from tests.chip.asker import Asker
 from tests.chip.simulated_chip import SimulatedChip
 
-pytestmark = [pytest.mark.chip, pytest.mark.timeout(200)]
+pytestmark = [pytest.mark.chip, pytest.mark.parallel, pytest.mark.timeout(200)]
 
 REST = (0,) * 5
 ALL = (90, 100, 110, 120, 130)

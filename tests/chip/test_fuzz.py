@@ -12,7 +12,7 @@ FUZZER = ROOT / "build" / "fuzz" / "fuzz_glove"
 CORPUS = Path(__file__).parent / "fuzz" / "corpus"
 SECONDS = int(os.environ.get("FUZZ_SECONDS", "5"))
 
-pytestmark = [pytest.mark.chip, pytest.mark.timeout(SECONDS + 120)]
+pytestmark = [pytest.mark.chip, pytest.mark.parallel, pytest.mark.timeout(SECONDS + 120)]
 
 
 def fuzz(folder: Path, *arguments: str) -> str:

@@ -16,7 +16,7 @@ from tests.integration.recorder import START_S
 from tests.integration.swarm import launched
 from tests.integration.test_console_flight import REACTION_S, port_of, take_off
 
-pytestmark = [pytest.mark.parallel, pytest.mark.xdist_group("console"), pytest.mark.timeout(180)]
+pytestmark = pytest.mark.timeout(180)
 
 NOBODY = 65_534
 HALF_OPEN, IDLE_PAGES = 1_300, 40

@@ -8,11 +8,7 @@ import pytest
 
 from tests.integration.shell import BASH, CTRL_Z, PROMPT, shell
 
-pytestmark = [
-    pytest.mark.parallel,
-    pytest.mark.timeout(120),
-    pytest.mark.skipif(not BASH.exists(), reason="types into bash"),
-]
+pytestmark = [pytest.mark.timeout(120), pytest.mark.skipif(not BASH.exists(), reason="types into bash")]
 
 FLY = "swarmtouch up rhombus --no-live --set limits.takeoff_height=0.3"
 FLYING = "mode FOLLOW"

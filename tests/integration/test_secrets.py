@@ -18,11 +18,7 @@ from shared.formation import build_formation
 from shared.net.keyring import Keyring
 from shared.nodes import all_nodes
 from tests.integration.swarm import Launched, launched
-from tests.integration.test_up import children_of
-from tests.integration.test_up import pytestmark as of_flights
-
-# Consoles look for a free port near their own, so one starts at a time.
-pytestmark = [*of_flights, pytest.mark.xdist_group("console")]
+from tests.integration.test_up import children_of, pytestmark  # noqa: F401  as there
 
 TOKEN = "a token that nobody else has"  # noqa: S105  of the test
 FLOWN_S = 2.0
