@@ -66,7 +66,7 @@ class Shell:
 
 @contextmanager
 def shell(folder: Path) -> Iterator[Shell]:
-    """Opens a shell in a folder; afterwards it is gone."""
+    """Opens a shell in a folder; afterwards it is gone, and with it whatever it has started that still runs."""
     pid, master = pty.fork()
     if pid == 0:
         os.chdir(folder)
@@ -82,7 +82,18 @@ def shell(folder: Path) -> Iterator[Shell]:
         opened.until(PROMPT)
         yield opened
     finally:
-        os.kill(pid, signal.SIGKILL)
+        # A job in the background would outlive its shell, and fly on beside the next test.
+        for member in (*_session(pid), pid):
+            with suppress(ProcessLookupError):
+                os.kill(member, signal.SIGKILL)
         os.waitpid(pid, 0)
         if opened._master >= 0:
             opened.hang_up()
+
+
+def _session(leader: int) -> Iterator[int]:
+    """Yields the processes of a session, by Linux's /proc; flights end their own."""
+    for folder in Path("/proc").glob("[0-9]*"):
+        with suppress(ProcessLookupError):
+            if os.getsid(int(folder.name)) == leader:
+                yield int(folder.name)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.integration.children import is_running
 from tests.integration.shell import BASH, CTRL_Z, PROMPT, shell
 
 pytestmark = [pytest.mark.timeout(120), pytest.mark.skipif(not BASH.exists(), reason="types into bash")]
@@ -23,6 +24,18 @@ def summary_of(folder: Path) -> dict[str, object]:
         time.sleep(0.02)
     summary: dict[str, object] = json.loads(path.read_text())
     return summary
+
+
+def test_what_was_started_in_a_shell_ends_with_it(tmp_path: Path) -> None:
+    with shell(tmp_path) as terminal:
+        terminal.type("sleep 600 & echo started $!.\n")
+        terminal.until("\nstarted ")
+        pid = int(terminal.until("."))
+        assert is_running(pid)
+    deadline = time.monotonic() + 10.0
+    while is_running(pid):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 def test_ctrl_z_lands_before_it_stops_and_fg_brings_flight_and_keys_back(tmp_path: Path) -> None:
