@@ -1,6 +1,8 @@
 """One drone's brain without I/O: bytes and time in, state out. The process loop and the simulator drive it."""
 
+import functools
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
 
 from agents.around import drones_around, walkers_around
 from agents.company import Company, Memory, look_around
@@ -24,14 +26,17 @@ from shared.topics import DRONE_STATE, HAND, PLACES
 from shared.transport import Arrival
 from shared.vehicles import vehicle_settings
 
-NEVER = float("inf")
-HAND_KEY = HAND.key()
+NEVER: Final = float("inf")
+HAND_KEY: Final = HAND.key()
 
-DOUBTED_FOR = 1.0
+DOUBTED_FOR: Final = 1.0
 """That somebody says what cannot be believed is told for this long, s."""
-_PLACES_PERIOD_NS = round(NS_PER_S / PLACES.rate_hz)
-_DOUBTED_NS = round(DOUBTED_FOR * NS_PER_S)
-_NOBODY: frozenset[int] = frozenset()
+_PLACES_PERIOD_NS: Final = round(NS_PER_S / PLACES.rate_hz)
+_DOUBTED_NS: Final = round(DOUBTED_FOR * NS_PER_S)
+_NOBODY: Final[frozenset[int]] = frozenset()
+_REJECTED_INPUT: Final[int] = Flag.REJECTED_INPUT.value
+# Python takes as long to make a member of an enumeration as the law for half a step.
+_flags_of = functools.cache(Flag)
 
 
 class Agent:
@@ -135,7 +140,7 @@ class Agent:
             displacements={name: links[i].displacement for i, name in enumerate(self._links)},
             pose_age=pose_age,
             battery=pose.battery,
-            flags=Flag(output.flags) | Flag.REJECTED_INPUT if self._doubts(now_ns) else Flag(output.flags),
+            flags=_flags_of(output.flags | _REJECTED_INPUT if self._doubts(now_ns) else output.flags),
             heard=self._note_used(self._state),
             unheard=company.unheard,
             lost=company.lost,
@@ -205,7 +210,8 @@ class Agent:
         company = look_around(self._drone, listened, senses.drones, doubted, now_ns, elsewhere)
         # Whoever has just come near is kept away from as it was told, until it is heard.
         coming = [elsewhere(drone) for drone in vicinity.near if drone not in listened]
-        return company._replace(missing=[*company.missing, *(seen for seen in coming if seen is not None)])
+        company.missing.extend(seen for seen in coming if seen is not None)
+        return company
 
     def _inputs(self, now_ns: int, pose: Pose, pose_age: float, company: Company) -> Inputs:
         hand, heard = self.senses.hand, self.senses.drones

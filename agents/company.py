@@ -10,8 +10,8 @@ Two drones keep apart only while one of them knows where the other is. So:
 * Nobody takes off or follows before it has heard everybody, or has been told where they were seen last.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Final, NamedTuple, final
 
 from agents.control.modes import GROUND, HAND_LAND, STOP, TOUCHDOWN
 from shared.clock import NS_PER_S
@@ -19,16 +19,16 @@ from shared.messages import MOST_LOST, DroneState, Mode, Seen
 from shared.senses import Sensed
 from shared.topics import DRONE_STATE
 
-UNHEARD_AFTER = DRONE_STATE.stale_s
+UNHEARD_AFTER: Final = DRONE_STATE.stale_s
 """A drone that has been silent for longer is not heard, s."""
-TOLD_WITHIN = 2.0
+TOLD_WITHIN: Final = 2.0
 """The word of somebody who is heard goes round within this time, s."""
-SETTLING = 5.0
+SETTLING: Final = 5.0
 """A landing takes longer than its way at the landing speed by at most this, s."""
-FALL = 2.0
+FALL: Final = 2.0
 """A body whose motors are cut is on the ground within this time, s."""
 
-_UNHEARD_NS = round(UNHEARD_AFTER * NS_PER_S)
+_UNHEARD_NS: Final = round(UNHEARD_AFTER * NS_PER_S)
 
 
 class Memory(NamedTuple):
@@ -60,7 +60,8 @@ class Memory(NamedTuple):
         return HAND_LAND + max(height, self.takeoff_height) / self.landing_speed + SETTLING
 
 
-class Company(NamedTuple):
+@final
+class Company:
     """What one drone knows of the others.
 
     Attributes:
@@ -74,24 +75,36 @@ class Company(NamedTuple):
         alone: Whether it hears nobody although there are others.
     """
 
-    heard: list[Sensed[DroneState]]
-    missing: list[Seen]
-    unheard: tuple[int, ...]
-    lost: tuple[Seen, ...]
-    awaited: tuple[int, ...]
-    deaf: frozenset[int]
-    missed: bool
-    alone: bool
+    def __init__(
+        self,
+        heard: list[Sensed[DroneState]],
+        missing: list[Seen],
+        unheard: tuple[int, ...],
+        lost: tuple[Seen, ...],
+        awaited: tuple[int, ...],
+        deaf: frozenset[int],
+        *,
+        missed: bool,
+        alone: bool,
+    ) -> None:
+        self.heard: Final = heard
+        self.missing: Final = missing
+        self.unheard: Final = unheard
+        self.lost: Final = lost
+        self.awaited: Final = awaited
+        self.deaf: Final = deaf
+        self.missed: Final = missed
+        self.alone: Final = alone
 
 
-_NOBODY: frozenset[int] = frozenset()
+_NOBODY: Final[frozenset[int]] = frozenset()
 
 
 def look_around(
     drone: int,
-    memories: Mapping[int, Memory],
-    known: Mapping[int, Sensed[DroneState]],
-    doubted_ns: Mapping[int, int],
+    memories: dict[int, Memory],
+    known: dict[int, Sensed[DroneState]],
+    doubted_ns: dict[int, int],
     now_ns: int,
     elsewhere: Callable[[int], Seen | None] | None = None,
 ) -> Company:
@@ -128,22 +141,22 @@ def look_around(
     else:
         broken = any(_is_seen_elsewhere(known.get(other), told.get(other), now_ns) for other in lower)
     return Company(
-        heard=heard,
-        missing=missing,
-        unheard=tuple(silent),
-        lost=tuple(sorted(seen, key=lambda each: (each not in missing, each.age))[:MOST_LOST]),
-        awaited=tuple(sorted(awaited)),
-        deaf=deaf,
+        heard,
+        missing,
+        tuple(silent),
+        tuple(sorted(seen, key=lambda each: (each not in missing, each.age))[:MOST_LOST]),
+        tuple(sorted(awaited)),
+        deaf,
         missed=bool(deaf) or broken or cut_off,
         alone=not heard,
     )
 
 
 def _seen(
-    silent: Iterable[int],
-    known: Mapping[int, Sensed[DroneState]],
-    reports: Collection[DroneState],
-    told: Mapping[int, Seen | None],
+    silent: list[int],
+    known: dict[int, Sensed[DroneState]],
+    reports: list[DroneState],
+    told: dict[int, Seen | None],
     now_ns: int,
 ) -> list[Seen]:
     """Returns as what the silent ones were seen last: by this drone itself, or else by others."""
@@ -169,7 +182,7 @@ def _own(sensed: Sensed[DroneState], now_ns: int) -> Seen:
     )
 
 
-def _told(other: int, reports: Iterable[DroneState]) -> Seen | None:
+def _told(other: int, reports: list[DroneState]) -> Seen | None:
     seen = [each for report in reports for each in report.lost if each.id == other]
     return max(seen, key=lambda each: (each.epoch, each.seq, -each.age), default=None)
 
@@ -188,7 +201,7 @@ def may_fly(seen: Seen, memory: Memory, doubted_ns: int | None, now_ns: int) -> 
     return age < memory.lasts(seen.mode, seen.position[2])
 
 
-def _is_heard_elsewhere(other: int, heard: Iterable[Sensed[DroneState]]) -> bool:
+def _is_heard_elsewhere(other: int, heard: list[Sensed[DroneState]]) -> bool:
     """Says whether one that is silent is heard by somebody else, where everybody listens to everybody."""
     return any(other not in sensed.message.unheard for sensed in heard)
 

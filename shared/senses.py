@@ -12,7 +12,7 @@ from shared.codec import decode
 from shared.errors import DecodeError
 from shared.messages import NO_HAND, ORIGIN, DroneState, HandSample, Heard, Message, ObstacleState, Places, Wish
 from shared.obstacle_watch import ObstacleWatch
-from shared.order import Sample, check_newer
+from shared.order import check_newer
 from shared.plausibility import HAND_LIMITS, Believed, MotionLimits, believe, check_ahead, check_possible
 from shared.signature import Verify
 from shared.topics import DRONE_STATE, HAND, OBSTACLE, PLACES, parse_key
@@ -20,24 +20,29 @@ from shared.transport import Arrival
 
 M = TypeVar("M", bound=Message)
 
-NEVER = float("inf")
-_HAND_KEY = HAND.key()
-_LOG_PERIOD_NS = 5 * NS_PER_S
+NEVER: Final = float("inf")
+_HAND_KEY: Final = HAND.key()
+_HAND_STALE: Final = HAND.stale_s
+_DRONE_STALE: Final = DRONE_STATE.stale_s
+_LOG_PERIOD_NS: Final = 5 * NS_PER_S
 _log = logging.getLogger("senses")
 
 
 @final
 class Sensed(Generic[M]):
-    """One message and when it arrived (own clock, ns)."""
+    """One message.
+
+    Attributes:
+        message: What was said.
+        arrival_ns: When it arrived (own clock).
+        heard: What to report about having used it, and what its order is judged by.
+    """
 
     def __init__(self, message: M, arrival_ns: int) -> None:
         self.message: Final = message
         self.arrival_ns: Final = arrival_ns
-
-    @property
-    def heard(self) -> Heard:
-        """Returns what to report about having used it."""
-        return Heard(self.message.epoch, self.message.seq, self.arrival_ns)
+        # As `Heard(...)`, which is a function of Python's.
+        self.heard: Final = tuple.__new__(Heard, (message.epoch, message.seq, arrival_ns))
 
     def age(self, now_ns: int) -> float:
         """Returns the time since it arrived, s."""
@@ -117,7 +122,7 @@ class Senses:
             DecodeError: It is not newer than the last one.
         """
         if self.hand is not None:
-            check_newer(_order(sensed), _order(self.hand), HAND.stale_s)
+            check_newer(sensed.heard, self.hand.heard, _HAND_STALE)
         sample = sensed.message
         if sample.position != NO_HAND:
             try:
@@ -145,7 +150,7 @@ class Senses:
             if self._verify:
                 # A signed sample that is older was recorded from the air: no silence makes it acceptable.
                 if self.hand is not None:
-                    check_newer(_order(sample), _order(self.hand), NEVER)
+                    check_newer(sample.heard, self.hand.heard, NEVER)
                 self._verify(payload)
             self.hear_hand(sample)
             return
@@ -169,7 +174,7 @@ class Senses:
             DecodeError: It is not newer than what that one told last.
         """
         if (known := self.places.get(sensed.message.id)) is not None:
-            check_newer(_order(sensed), _order(known), PLACES.stale_s)
+            check_newer(sensed.heard, known.heard, PLACES.stale_s)
         self.places[sensed.message.id] = sensed
 
     def _take_other(self, key: str, payload: bytes, arrival_ns: int) -> None:
@@ -193,7 +198,7 @@ class Senses:
 
     def _check_drone(self, sensed: Sensed[DroneState]) -> None:
         if (known := self.drones.get(sensed.message.id)) is not None:
-            check_newer(_order(sensed), _order(known), DRONE_STATE.stale_s)
+            check_newer(sensed.heard, known.heard, _DRONE_STALE)
 
     def _believe(self, key: str, sensed: Sensed[DroneState], bodies: MotionLimits) -> None:
         """Remembers a state that can be.
@@ -229,7 +234,3 @@ class Senses:
         if now_ns - self._logged_ns > _LOG_PERIOD_NS:
             self._logged_ns = now_ns
             _log.warning("dropped a sample on %s: %s (so far %s)", key, error, dict(self.rejected))
-
-
-def _order(sensed: Sensed[M]) -> Sample:
-    return (sensed.message.epoch, sensed.message.seq, sensed.arrival_ns)
