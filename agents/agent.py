@@ -7,7 +7,7 @@ from typing import Final
 from agents.around import drones_around, walkers_around
 from agents.company import Company, Memory, look_around
 from agents.control.hand import HandInput
-from agents.control.modes import HAND_STALE
+from agents.control.modes import GROUND, HAND_STALE
 from agents.control.repair import REFERENCE_LOST, Reference
 from agents.control.step import Inputs, Settings, State, start, step
 from agents.settings import clearances
@@ -103,6 +103,8 @@ class Agent:
 
     def due(self, now_ns: int) -> Due:
         """Returns when the next step is due, given what has been heard so far."""
+        if self._rests(now_ns):
+            return Due(self._last_step_ns + self._rule.resting, [HAND_KEY])
         awaited = self._awaited(now_ns)
         return Due(due_ns(self._rule, self._last_step_ns, inputs_complete=not awaited), awaited)
 
@@ -151,6 +153,11 @@ class Agent:
         )
         self.steps += 1
         return state
+
+    def _rests(self, now_ns: int) -> bool:
+        hand = self.senses.hand
+        grounded = self._state is not None and self._state.mode.mode is GROUND
+        return grounded and (hand is None or hand.age(now_ns) > HAND_STALE)
 
     def _awaited(self, now_ns: int) -> list[str]:
         """Returns the inputs that are alive but not newer than at the last step; none: a step may be made.

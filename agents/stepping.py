@@ -4,7 +4,7 @@ Waiting for the next 60 Hz tick would cost 1-16 ms per hop.
 """
 
 from collections.abc import Collection
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from attrs import frozen
 
@@ -13,14 +13,23 @@ from shared.scenario import Rates
 
 FALLBACK_PERIODS = 1.5
 """Without its inputs an agent steps after this many periods; at 1.0 jitter would cause extra steps."""
+RESTING_NS: Final = NS_PER_S // 10
+"""Who waits on the ground is to be heard before it counts as silent, and leaves the processor to others."""
 
 
 @frozen
 class StepRule:
-    """The two bounds, ns: not earlier than `shortest` and not later than `longest` after the last step."""
+    """When the next step is due, ns after the last one.
+
+    Attributes:
+        shortest: Not earlier.
+        longest: Not later.
+        resting: Of a drone on the ground that hears no hand.
+    """
 
     shortest: int
     longest: int
+    resting: int
 
 
 class Due(NamedTuple):
@@ -35,9 +44,9 @@ def step_rule(rates: Rates) -> StepRule:
 
     An agent steps at the rate of the hand, be it slower than `control_hz`; without a hand at its own.
     """
+    longest = round(NS_PER_S * FALLBACK_PERIODS / min(rates.control_hz, rates.hand_hz))
     return StepRule(
-        shortest=round(NS_PER_S / rates.max_control_hz),
-        longest=round(NS_PER_S * FALLBACK_PERIODS / min(rates.control_hz, rates.hand_hz)),
+        shortest=round(NS_PER_S / rates.max_control_hz), longest=longest, resting=max(longest, RESTING_NS)
     )
 
 

@@ -84,15 +84,36 @@ def hear(brain: Agent, at: int, *messages: HandSample | DroneState) -> None:
         brain.receive({key: [Arrival(encode(message), at)]})
 
 
-def test_alone_on_the_ground_it_says_so_and_steps_at_the_slow_rate() -> None:
+def test_alone_on_the_ground_it_says_so_and_steps_ten_times_a_second() -> None:
     brain = agent(1)
     first = brain.step(T0, GROUNDED, 0.0)
     assert (first.id, first.epoch, first.seq, first.step_ns) == (1, T0, 0, T0)
     assert (first.mode, first.heard, first.goal) == (Mode.GROUND, {}, GROUNDED.position)
     assert (first.position, first.battery) == (GROUNDED.position, 0.9)
     assert first.displacements == {"human-1": ORIGIN}
+    assert brain.due(T0) == (T0 + 100 * MS, [HAND.key()])
+    assert brain.step(T0 + 100 * MS, GROUNDED, 0.02).seq == 1
+
+
+def test_who_rests_steps_for_the_hand_alone_and_at_once() -> None:
+    brain = agent(4)
+    hear(brain, T0, *(state(drone, 0, Mode.GROUND) for drone in (1, 2, 3)))
+    brain.step(T0, GROUNDED, 0.0)
+    now = T0 + 50 * MS
+    hear(brain, now, *(state(drone, 1, Mode.GROUND) for drone in (1, 2, 3)))
+    assert brain.due(now).at_ns == T0 + 100 * MS, "its references do not wake it"
+    hear(brain, now, hand(0, wish=Wish.GROUND))
+    assert brain.due(now).at_ns == T0 + 8_333_333
+    brain.step(now, GROUNDED, 0.0)
+    assert brain.due(now).at_ns == now + 25 * MS, "with a hand it keeps pace"
+    silent = now + 260 * MS
+    assert brain.due(silent) == (now + 100 * MS, [HAND.key()])
+
+
+def test_in_the_air_it_steps_at_its_own_rate_without_a_hand() -> None:
+    brain = agent(1)
+    brain.step(T0, FLYING, 0.0)
     assert brain.due(T0).at_ns == T0 + 25 * MS
-    assert brain.step(T0 + 25 * MS, GROUNDED, 0.02).seq == 1
 
 
 def test_it_takes_off_when_the_hand_wants_to_fly_and_everybody_is_heard() -> None:

@@ -12,7 +12,7 @@ MS = 1_000_000
 
 def test_the_bounds_are_120_hz_and_one_and_a_half_periods() -> None:
     rule = step_rule(load_scenario("rhombus").rates)
-    assert rule == StepRule(shortest=8_333_333, longest=25 * MS)
+    assert rule == StepRule(shortest=8_333_333, longest=25 * MS, resting=100 * MS)
 
 
 def test_with_a_slower_hand_it_steps_at_the_rate_of_the_hand() -> None:
@@ -22,7 +22,7 @@ def test_with_a_slower_hand_it_steps_at_the_rate_of_the_hand() -> None:
 
 
 def test_with_its_inputs_it_steps_as_soon_as_it_may_else_at_the_latest() -> None:
-    rule = StepRule(shortest=8 * MS, longest=25 * MS)
+    rule = StepRule(shortest=8 * MS, longest=25 * MS, resting=100 * MS)
     assert due_ns(rule, 100 * MS, inputs_complete=True) == 108 * MS
     assert due_ns(rule, 100 * MS, inputs_complete=False) == 125 * MS
 
