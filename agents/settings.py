@@ -52,14 +52,14 @@ def drone_row(scenario: Scenario, formation: Formation, drone: int) -> Row:
     own_heights = scenario.swarm.law == "stable" or scenario.formation.height_from == "references"
     heights = [formation.rest[formation.row(other)][2] for other in references]
     return Row(
-        weights=(weights.get(0, 0.0), *(weights[1 + formation.row(other)] for other in references)),
+        weights=_one((weights.get(0, 0.0), *(weights[1 + formation.row(other)] for other in references))),
         offset=formation.offsets[row],
         links=tuple(
             Link(link.name, _spring(link.mass, link.damping, link.stiffness, link.gain), link.limit)
             for link in formation.links_into(drone)
         ),
         scale=formation.correction_scale,
-        heights=None if own_heights else tuple(heights),
+        heights=None if own_heights else _one(tuple(heights)),
     )
 
 
@@ -187,6 +187,12 @@ def _columns(scenario: Scenario) -> Columns | None:
         radius=rules.projection_radius,
         margin=rules.projection_margin,
     )
+
+
+@functools.cache
+def _one(values: tuple[float, ...]) -> tuple[float, ...]:
+    """Makes equal tuples one: what many drones share stays in the caches of a processor."""
+    return values
 
 
 @functools.cache

@@ -1,15 +1,19 @@
 """Neighbour search with a cell list: who is nearer than a reach, without looking at all pairs."""
 
 import math
-from typing import Final, Generic, TypeVar, final
+from typing import Final, Generic, TypeVar, cast, final
+
+from mypy_extensions import mypyc_attr
 
 
+@mypyc_attr(acyclic=True)
 class Place:
-    """Where something is in the plane, m."""
+    """Where something is in the plane, m, and who comes after it in its cell."""
 
     def __init__(self, x: float, y: float) -> None:
         self.x: Final = x
         self.y: Final = y
+        self.after: Place | None = None
 
 
 P = TypeVar("P", bound=Place)
@@ -19,12 +23,14 @@ P = TypeVar("P", bound=Place)
 class Cells(Generic[P]):
     """Places in square cells at least as wide as the reach, so that neighbours are in the nine around one.
 
+    The places of a cell are a chain through the places themselves: lists would be as large as what is in them.
+
     Args:
-        places: Who is where.
+        places: Who is where; in no other cells from now on.
         reach: m, > 0.
 
     Attributes:
-        cells: The places in each cell, column by column.
+        cells: The first place in each cell, column by column.
     """
 
     def __init__(self, places: list[P], reach: float) -> None:
@@ -40,9 +46,11 @@ class Cells(Generic[P]):
         self._low_x, self._low_y = low_x, low_y
         self._columns = math.floor(width / side) + 1
         self._rows = math.floor(height / side) + 1
-        self.cells: list[list[P]] = [[] for _ in range(self._columns * self._rows)]
-        for place in places:
-            self.cells[self._column(place) * self._rows + self._row(place)].append(place)
+        self.cells: list[P | None] = [None] * (self._columns * self._rows)
+        for place in reversed(places):
+            cell = self._column(place) * self._rows + self._row(place)
+            place.after = self.cells[cell]
+            self.cells[cell] = place
 
     def near(self, own: P) -> list[P]:
         """Returns who else is within reach of one of the places."""
@@ -51,10 +59,12 @@ class Cells(Generic[P]):
         found: list[P] = []
         for i in range(max(column - 1, 0), min(column + 2, self._columns)):
             for j in range(max(row - 1, 0), min(row + 2, self._rows)):
-                for place in self.cells[i * self._rows + j]:
+                place = self.cells[i * self._rows + j]
+                while place is not None:
                     dx, dy = place.x - x, place.y - y
                     if dx * dx + dy * dy <= squared and place is not own:
                         found.append(place)
+                    place = cast("P | None", place.after)
         return found
 
     def _column(self, place: P) -> int:

@@ -4,12 +4,15 @@ import math
 from dataclasses import dataclass
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.hand import MappedHand
 from agents.control.impedance import Link, LinkState
 from agents.control.vectors import Vector, clamp, norm, rotate
 from shared.messages import MAX_POSITION, MAX_VELOCITY, Mode
 
 
+@mypyc_attr(acyclic=True)
 class Guide:
     """What a drone follows in the place of one reference.
 

@@ -8,6 +8,8 @@ import math
 from dataclasses import dataclass
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.vectors import ORIGIN, Vector
 
 _SERIES_BELOW: Final = 0.1
@@ -61,6 +63,7 @@ class Link:
     limit: float
 
 
+@mypyc_attr(acyclic=True)
 @final
 class LinkState:
     """Displacement, m, and rate, m/s, of one link in the formation's frame."""

@@ -7,12 +7,15 @@ and the lead velocity, so the vehicle is never asked for more acceleration than 
 import math
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.vectors import ORIGIN, Vector, norm, shorten
 
 BRAKING_SHARE: Final = 0.8
 """Share of the acceleration limit used to plan braking; the rest is for following a moving goal."""
 
 
+@mypyc_attr(acyclic=True)
 @final
 class Trajectory:
     """Reference of one drone.

@@ -89,13 +89,14 @@ def advance_flock(
         duration: Time to the next one, s.
         stable: Whether references are the others' goals instead of their positions.
     """
-    _set_goals(flock, hand, dt, stable=stable)
+    ahead = _set_goals(flock, hand, dt, stable=stable)
     hand_speed = norm(sample.velocity)
-    cells = Cells([member.encounter for member in flock], _reach(flock))
+    cells = Cells([member.encounter for member in flock], _reach(flock, ahead))
+    known, own_hand = flock[0].steering, [_hand_met(sample, flock[0].steering)]
     for member in flock:
         rules, goal, rate = member.steering, member.goal, member.goal_velocity
-        lag, berth = rules.safety.horizontal.lag, rules.safety.hand
-        own_hand = [walker_seen(sample.position, sample.velocity, 0.0, lag, berth)]
+        if rules is not known:  # drones with equal vehicles share theirs
+            known, own_hand = rules, [_hand_met(sample, rules)]
         around = Surroundings(cells.near(member.encounter), own_hand, hand_speed)
         steered = steer(member.trajectory, member.motion, goal, rate, around, rules, dt, floor=True)
         member.trajectory, guarded = steered.trajectory, steered.guarded
@@ -104,37 +105,42 @@ def advance_flock(
         member.flyer = advance(member.flyer, FLY, member.setpoint, duration)
 
 
-def _set_goals(flock: list[Member], hand: MappedHand, dt: float, *, stable: bool) -> None:
-    velocity = rotate(hand.velocity, -hand.yaw)
+def _hand_met(sample: HandInput, rules: SteeringSettings) -> Encounter:
+    return walker_seen(sample.position, sample.velocity, 0.0, rules.safety.horizontal.lag, rules.safety.hand)
+
+
+def _set_goals(flock: list[Member], hand: MappedHand, dt: float, *, stable: bool) -> float:
+    """Sets everybody's goal; returns how far a reference is ahead of its body at most, seen from above, m."""
+    velocity, ahead = rotate(hand.velocity, -hand.yaw), 0.0
     for member in flock:
         member.position = member.flyer.body.position
         flying = member.flyer.body.velocity
         safety = member.steering.safety
         across, up = safety.horizontal, safety.vertical
         member.motion = watch(member.motion, member.position, flying, 0.0, dt, across, up)
-        member.encounter = member.met()
+        member.encounter = each = member.met()
+        x, y, _ = member.trajectory.point
+        ahead = max(ahead, (x - each.x) * (x - each.x) + (y - each.y) * (y - each.y))
         member.links = step_links(member.links, member.row.links, velocity, dt)
         lead = [reference.guide for reference in member.references]
         goal, rate = goal_of(member.row, member.links, hand, lead)
         member.goal, member.goal_velocity = goal, rate
         member.guide = Guide(goal if stable else member.position, rate, modes.FOLLOW)
+    return math.sqrt(ahead)
 
 
-def _reach(flock: list[Member]) -> float:
+def _reach(flock: list[Member], ahead: float) -> float:
     """Returns how far anything can matter, m.
 
     The field acts on the reference, which is ahead of its body; a barrier's reach grows with the closing speed,
     at most twice the largest difference from the mean velocity.
     """
-    mean_u = mean_v = ahead = apart = 0.0
+    mean_u = mean_v = apart = 0.0
     for member in flock:
-        mean_u += member.encounter.u
-        mean_v += member.encounter.v
+        mean_u, mean_v = mean_u + member.encounter.u, mean_v + member.encounter.v
     mean_u, mean_v = mean_u / float(len(flock)), mean_v / float(len(flock))
     for member in flock:
-        x, y, _ = member.trajectory.point
         each = member.encounter
-        ahead = max(ahead, (x - each.x) * (x - each.x) + (y - each.y) * (y - each.y))
         du, dv = each.u - mean_u, each.v - mean_v
         apart = max(apart, du * du + dv * dv)
     reach, closing = 0.0, 2.0 * math.sqrt(apart)
@@ -142,5 +148,5 @@ def _reach(flock: list[Member]) -> float:
         safety, field = member.steering.safety, member.steering.separation
         brake = safety.planar.reach(closing + member.clearance.surprise, safety.horizontal.acceleration)
         barrier = member.clearance.distance + brake
-        reach = max(reach, field.radius + field.d0 + math.sqrt(ahead), barrier)
+        reach = max(reach, field.radius + field.d0 + ahead, barrier)
     return reach

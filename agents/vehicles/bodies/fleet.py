@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.vectors import ORIGIN, Vector
 from agents.vehicles.base import Pose
 from agents.vehicles.bodies.crazyflie import Crazyflie
@@ -18,6 +20,7 @@ BODIES: Final[dict[str, Model]] = {"identified": Identified(), "crazyflie": Craz
 """Body type of a scenario (`vehicles.*.body`) -> what moves it."""
 
 
+@mypyc_attr(acyclic=True)
 @final
 class Flyer:
     """One body, what moves it, and whether a hand holds it in place."""

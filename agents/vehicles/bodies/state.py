@@ -4,6 +4,8 @@ import enum
 import math
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.vectors import ORIGIN, Planar, Vector
 
 AIRBORNE_HEIGHT: Final = 0.03
@@ -33,6 +35,7 @@ IDLE: Final[int] = Command.IDLE.value
 CUT: Final[int] = Command.CUT.value
 
 
+@mypyc_attr(acyclic=True)
 @final
 class Body:
     """State of one body.
