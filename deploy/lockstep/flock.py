@@ -146,7 +146,7 @@ def _reach(flock: list[Member], ahead: float) -> float:
     reach, closing = 0.0, 2.0 * math.sqrt(apart)
     for member in flock:
         safety, field = member.steering.safety, member.steering.separation
-        brake = safety.planar.reach(closing + member.clearance.surprise, safety.horizontal.acceleration)
+        brake = safety.planar.reach(closing + member.encounter.surprise, safety.horizontal.acceleration)
         barrier = member.clearance.distance + brake
         reach = max(reach, field.radius + field.d0 + ahead, barrier)
     return reach

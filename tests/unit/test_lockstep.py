@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agents.control.safety.encounter import DELAY
 from agents.settings import hand_settings
 from agents.vehicles.world.setup import referee_rules
 from deploy.lockstep.central import Flock, fly_central
 from deploy.lockstep.collector import no_collector
+from deploy.lockstep.flock import _reach
 from deploy.lockstep.hand_track import map_samples, relayed
 from deploy.lockstep.lockstep import Lockstep, fly_lockstep
 from deploy.lockstep.record import Record, judge, write_csv
@@ -214,6 +216,19 @@ def test_what_is_rounded_stays_small_in_a_formation_with_room() -> None:
             flock.advance(sample, mapped)
         seen.append(np.array([member.setpoint for member in flock.members]))
     assert np.abs(seen[0] - seen[1]).max() < 1e-10
+
+
+def test_a_flock_looks_no_further_than_its_drones_can_brake() -> None:
+    scenario = load_scenario("grid", ["formation.n=25"])
+    formation = build_formation(scenario)
+    ((sample, mapped), *_) = map_samples(still(1), hand_settings(scenario, formation))
+    flock = Flock(scenario, formation, rest_places(formation, mapped))
+    flock.advance(sample, mapped)
+    rules = flock.members[0].steering.safety
+    wait = DELAY * flock.members[0].clearance.surprise
+    stop = rules.planar.reach(wait, rules.horizontal.acceleration)
+    assert _reach(flock.members, 0.0) == pytest.approx(flock.members[0].clearance.distance + stop, abs=0.01)
+    assert _reach(flock.members, 5.0) > 5.0, "a reference that is far ahead is looked around as well"
 
 
 def test_nothing_that_a_flock_makes_needs_a_collector() -> None:
