@@ -4,12 +4,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shared.errors import ConfigError
+from shared.plain_text import plain
 
 
 def main(*, runs: Sequence[Path], output: Path) -> int:
     """Writes the report; returns the exit code."""
     try:
-        from observer.report.source import open_record  # noqa: PLC0415  the extra `plot`
+        from observer.report.page import remarks  # noqa: PLC0415  the extra `plot`
+        from observer.report.source import open_record  # noqa: PLC0415
         from observer.report.write import write_report  # noqa: PLC0415
     except ImportError as error:
         raise ConfigError(
@@ -21,4 +23,6 @@ def main(*, runs: Sequence[Path], output: Path) -> int:
     except OSError as error:
         raise ConfigError(f"-o {output}: the report cannot be written there: {error}") from error
     print(page)
+    for remark in remarks(flights):
+        print(plain(remark))
     return 0

@@ -70,7 +70,7 @@ def page(flights: Sequence[FlightRecord], rows: Mapping[str, FleetRow], shown: S
             '<meta name="viewport" content="width=device-width">',
             f"<title>{title}</title><style>{_LOOK}</style></head><body>",
             f"<h1>{title}</h1><p>{about}.</p>",
-            *(f'<p class="absent">{_text(remark)}</p>' for remark in first.remarks),
+            *(f'<p class="absent">{_text(remark)}</p>' for remark in remarks(flights)),
             "<h2>Fleet</h2>",
             fleet_table(rows),
             f"<p>{_FLEET}</p>",
@@ -78,6 +78,12 @@ def page(flights: Sequence[FlightRecord], rows: Mapping[str, FleetRow], shown: S
             "</body></html>\n",
         )
     )
+
+
+def remarks(flights: Sequence[FlightRecord]) -> list[str]:
+    """Returns what was left out of flights, and why; each is named if there are several."""
+    several = len(flights) > 1
+    return [f"{one.name}: {remark}" if several else remark for one in flights for remark in one.remarks]
 
 
 def fleet_table(rows: Mapping[str, FleetRow]) -> str:

@@ -17,6 +17,9 @@ from mcap.writer import MCAP0_MAGIC
 
 from shared.recordings.unpack import LARGEST_CHUNK, UnpackError, unpack
 
+ENCODING = "msgpack"
+"""Of the messages in our traces."""
+
 _HEAD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQI")
 _LENGTH, _LONG = struct.Struct("<I"), struct.Struct("<Q")

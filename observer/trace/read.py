@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 
 from observer.swarm import LATEST, RUNS, SCENARIO_FILE
 from observer.trace import mcap_file
-from observer.trace.layout import RECORDER, SCENARIO, trace_files
-from observer.trace.mcap_file import DamageError, McapFile, MessageRecord
+from observer.trace.layout import SCENARIO, trace_files
+from observer.trace.mcap_file import ENCODING, DamageError, McapFile, MessageRecord
+from observer.trace.survey import Survey, described, look_through
 from shared.codec import decode, decode_on
 from shared.config import structure_scenario
 from shared.errors import ConfigError, DecodeError
@@ -27,10 +28,6 @@ from shared.topics import TOPICS
 MOST_IN_MEMORY = 4_000_000
 """Messages that whoever needs all of them at once takes: a quarter of an hour of 64 drones."""
 
-ENCODING = "msgpack"
-_MOST_METADATA = 20
-_MOST_NAMED = 10
-_LONGEST_COUNT = 20
 _RETIRED = (("net", "pointer_port"),)
 """Keys of the scenario that earlier recorders wrote, and that mean nothing any more."""
 
@@ -51,24 +48,6 @@ class Record(NamedTuple):
     seq: int
     publish_ns: int
     log_ns: int
-
-
-class Survey(NamedTuple):
-    """What a file says about itself outside its messages, wherever in it that stands.
-
-    Attributes:
-        metadata: Records by name.
-        channels: Number -> topic and encoding, as far as they stand outside chunks.
-        messages: How many there are to be; None if it does not say.
-        dropped: How many messages its recorder says it could not keep.
-        has_end: Whether it was finished.
-    """
-
-    metadata: dict[str, dict[str, str]]
-    channels: dict[int, tuple[str, str]]
-    messages: int | None
-    dropped: int
-    has_end: bool
 
 
 class Trace:
@@ -96,7 +75,7 @@ class Trace:
 
     def __init__(self, files: tuple[Path, ...]) -> None:
         self.files = files
-        self._surveys = [_survey(file) for file in files]
+        self._surveys = [look_through(file) for file in files]
         self.truncated = not all(survey.has_end for survey in self._surveys)
         self.rejected: Counter[tuple[str, str]] = Counter()
         self._begin()
@@ -226,31 +205,6 @@ def open_trace(source: str | Path | None = None) -> Trace:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
 
 
-def _survey(path: Path) -> Survey:
-    metadata: dict[str, dict[str, str]] = {}
-    channels: dict[int, tuple[str, str]] = {}
-    messages, dropped = None, 0
-    with mcap_file.open_mcap(path) as stream:
-        file = McapFile(stream)
-        for record in file.records():
-            try:
-                match record.opcode:
-                    case mcap_file.METADATA:
-                        name, entries = mcap_file.read_metadata(file.content(record))
-                        if name == RECORDER:
-                            dropped = _count(entries.get("dropped", ""))
-                        elif len(metadata) < _MOST_METADATA:
-                            metadata.setdefault(name, entries)
-                    case mcap_file.CHANNEL:
-                        channel = mcap_file.read_channel(file.content(record))
-                        channels[channel.id] = (channel.topic, channel.encoding)
-                    case mcap_file.STATISTICS:
-                        messages = mcap_file.read_message_count(file.content(record))
-            except DamageError:
-                continue
-        return Survey(metadata, channels, messages, dropped, file.has_end)
-
-
 def _scenario(
     files: tuple[Path, ...], surveys: list[Survey]
 ) -> tuple[dict[str, dict[str, str]], Scenario, str]:
@@ -259,7 +213,7 @@ def _scenario(
     Raises:
         ConfigError: Nobody knows what flew.
     """
-    why = f"it holds no scenario{_described(surveys)}"
+    why = f"it holds no scenario{described(surveys)}"
     for file, survey in zip(files, surveys, strict=True):
         if SCENARIO not in survey.metadata:
             continue
@@ -282,13 +236,6 @@ def _structured(tree: dict[str, Any], file: Path) -> Scenario:
     return structure_scenario(tree, str(file))
 
 
-def _described(surveys: list[Survey]) -> str:
-    """Names what is in files, as far as it stands outside chunks."""
-    found = sorted({channel for survey in surveys for channel in survey.channels.values()})
-    named = [f"{plain(topic)} ({plain(encoding)})" for topic, encoding in found[:_MOST_NAMED]]
-    return f", but {', '.join(named)}" if named else ""
-
-
 def _key_of(payload: bytes) -> str | None:
     """Tells by a message what it was sent on."""
     for topic in TOPICS:
@@ -298,7 +245,3 @@ def _key_of(payload: bytes) -> str | None:
             continue
         return topic.pattern.format(**{name: getattr(message, name) for name in message.__struct_fields__})
     return None
-
-
-def _count(text: str) -> int:
-    return int(text) if text.isdecimal() and len(text) < _LONGEST_COUNT else 0

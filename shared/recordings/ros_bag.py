@@ -11,7 +11,7 @@ import numpy as np
 from shared.clock import NS_PER_S
 from shared.errors import ConfigError
 from shared.recordings.bag_records import BagMessage, BagRecords
-from shared.recordings.csv_table import MOST_LINES
+from shared.recordings.csv_rows import MOST_LINES
 from shared.recordings.track import NO_STAMP, Found
 
 MOST_BODIES = 1_000

@@ -13,7 +13,8 @@ from observer.console.serve import find_token
 from shared.config import SCENARIOS, load_scenario
 from shared.errors import ConfigError
 from shared.files import LARGEST, encoding_of, read_text
-from shared.recordings.csv_table import LONGEST_LINE, MOST_CHARACTERS, MOST_LINES, read_table
+from shared.recordings.csv_rows import LONGEST_LINE, MOST_CHARACTERS, MOST_LINES
+from shared.recordings.csv_table import read_table
 from shared.recordings.flight_folder import read_track
 from shared.recordings.hand import read_hand
 from tests.flight_folders import write_flight
