@@ -27,8 +27,8 @@ INTERRUPTED_LANDING_S = 4.5
 """and so long after Ctrl-C: with the rest below everything has ended within 6 s."""
 SETTLING_S = 2.0
 """From a height that takes longer the landing has so much more than the descent itself."""
-RESUMING_S = 12.0
-"""When a stopped flight goes on, the hand's answer is awaited for so long."""
+HAND_S = 12.0
+"""The hand is awaited for so long, when a flight begins and when a stopped one goes on."""
 GRACE_S = (2.0, 1.0, 0.4)
 """From TERM to KILL at the end, after the first and after the second Ctrl-C (which ends all within 1 s)."""
 _PERIOD_S = 0.04
@@ -58,6 +58,8 @@ class Outcome:
         restarts: How many processes were started again.
         failed_starts: How often the system could not start a process, by name.
         landed: Whether every drone was on the ground at the end, without an emergency stop.
+        stopped: Drones whose motors an emergency stop has cut, wherever they were.
+        interrupted: Whether the operator has ended it early.
         refused: Processes that refused their configuration.
         simulated: Whether there was a simulated world with a referee.
         referee: What the referee saw; empty if that is unknown.
@@ -68,6 +70,8 @@ class Outcome:
     restarts: dict[str, int]
     failed_starts: dict[str, int]
     landed: bool
+    stopped: tuple[int, ...]
+    interrupted: bool
     refused: tuple[str, ...]
     simulated: bool
     referee: dict[str, float]
@@ -82,7 +86,7 @@ class Flight:
         monitor: What is heard of the flight.
         run_dir: Directory of this run.
         files: What processes read when they start, see `Supervisor`.
-        seconds: Length of the flight; None: until the hand ends it.
+        seconds: Length of the flight from the first sample of the hand on; None: until the hand ends it.
         landing_speed: How fast drones descend, m/s.
         view: Where to show it.
     """
@@ -151,6 +155,8 @@ class Flight:
         for row in self._rows:
             if row.role == RELAY:
                 self.supervisor.start(row)
+        # The length of the flight counts from here: a busy machine takes its time to start a relay.
+        await self._until(lambda: self.monitor.stats.hand is not None or self._is_called_off, HAND_S)
         await self._follow_hand()
         while self._stop_asked and not self._cut_short:
             await self._pause()
@@ -158,9 +164,7 @@ class Flight:
 
     async def _follow_hand(self) -> None:
         begun = time.monotonic()
-        await self._until(
-            lambda: self.monitor.ended_by_hand or self._cut_short or self._stop_asked, self._left_s
-        )
+        await self._until(lambda: self.monitor.ended_by_hand or self._is_called_off, self._left_s)
         self._left_s -= time.monotonic() - begun
 
     async def _pause(self) -> None:
@@ -181,7 +185,7 @@ class Flight:
         await asyncio.sleep(_PERIOD_S)
         if not self._cut_short:
             self.supervisor.order(_RELAY, "fly")
-            await self._until(lambda: not self.monitor.ended_by_hand or self._cut_short, RESUMING_S)
+            await self._until(lambda: not self.monitor.ended_by_hand or self._cut_short, HAND_S)
             self.phase = "flying"
 
     async def _land(self) -> None:
@@ -218,6 +222,11 @@ class Flight:
         """Whether the operator or a process that refuses its configuration ends the flight early."""
         return self._interrupts > 0 or bool(self._refused())
 
+    @property
+    def _is_called_off(self) -> bool:
+        """Whether it ends early, or pauses."""
+        return self._cut_short or self._stop_asked
+
     def _outcome(self, seconds: float, landed: bool) -> Outcome:
         children = self.supervisor.children.values()
         return Outcome(
@@ -226,6 +235,8 @@ class Flight:
             restarts={child.row.token: child.restarts for child in children},
             failed_starts={child.row.name: child.failed_starts for child in children if child.failed_starts},
             landed=landed,
+            stopped=self.monitor.stopped,
+            interrupted=self._interrupts > 0,
             refused=self._refused(),
             simulated=any(row.role == WORLD for row in self._rows),
             referee=self._read_referee(),

@@ -28,6 +28,7 @@ from deploy.launcher.summary import Json, flight_summary, print_summary
 from deploy.terminal.console import WIDTH, open_console
 from deploy.terminal.job_control import in_foreground
 from deploy.terminal.streams import PatientStream
+from glove_bridge.gloves import check_glove
 from glove_bridge.patterns import load_patterns
 from human_relay.sources import source_hints
 from observer.console import PORT
@@ -89,7 +90,8 @@ def launch(options: Options) -> Json:
         The summary (`deploy.launcher.summary`), which has also been printed and written to the run directory.
 
     Raises:
-        ConfigError: The scenario, the hand or the place for runs is refused; nothing has been started.
+        ConfigError: The scenario, the hand, the glove or the place for runs is refused; nothing has been
+            started.
         DeviceError: The bus cannot be opened.
     """
     scenario, formation, hand = _resolve(options)
@@ -125,6 +127,7 @@ def _say(console: Console, text: str) -> None:
 def _resolve(options: Options) -> tuple[Scenario, Formation, HandChoice]:
     if options.glove:
         load_patterns(options.glove.patterns)
+        check_glove(options.glove.uri)
     hints = hint_overrides(source_hints(options.hand))
     scenario, formation = open_scenario(options.scenario, (*hints, *options.overrides))
     tcp_ports, (udp_port,) = free_ports(tcp=len(all_nodes(formation)), udp=1)

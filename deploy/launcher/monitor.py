@@ -98,6 +98,11 @@ class Monitor:
         return len(modes) == len(self._ids) and all(mode is Mode.GROUND for mode in modes)
 
     @property
+    def stopped(self) -> tuple[int, ...]:
+        """The drones whose motors are off for good, by STOP."""
+        return tuple(drone for drone, state in self.stats.latest.items() if state.mode is Mode.STOP)
+
+    @property
     def ended_by_hand(self) -> bool:
         """Whether the hand itself has ended the flight and everybody is down."""
         hand = self.stats.hand

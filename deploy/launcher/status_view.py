@@ -15,12 +15,15 @@ from deploy.launcher.flight import Flight
 from deploy.launcher.glove_panel import GlovePanel
 from deploy.launcher.monitor import Monitor
 from deploy.terminal.job_control import in_foreground
+from deploy.terminal.streams import PatientStream
 from shared.conditions import conditions
 from shared.messages import DroneState, ProcessStatus
 from shared.nodes import BRIDGE, DRONE
 
 LIVE_PERIOD_S = 0.5
 PLAIN_PERIOD_S = 5.0
+_LEAVE_S = 0.5
+"""So long a reader that stalls is waited for before the terminal is left to others."""
 SUMMARISE_ABOVE = 16
 """With more agents than this only the unhealthy ones get a row."""
 _COLUMNS = ("id", "mode", "height", "goal error", "latency", "rate", "rejected", "restarts", "cpu", "flags")
@@ -138,6 +141,8 @@ class StatusView:
         """Leaves the terminal to others, until the next tick."""
         if self._live:
             self._live.stop()
+        if isinstance(self._console.file, PatientStream):
+            self._console.file.settle(_LEAVE_S)
 
     def tick(self, flight: Flight) -> None:
         """Says so when the phase changes, and shows the agents when it is time."""

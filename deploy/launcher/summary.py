@@ -11,7 +11,7 @@ from rich.table import Table
 from deploy.launcher.flight import Outcome, exit_word
 from deploy.launcher.monitor import Health, Monitor
 from deploy.launcher.process_table import GloveChoice
-from deploy.verdict import absences, contacts
+from deploy.verdict import absences, contacts, landing
 from observer.agent_log import AgentSummary
 from observer.glove_log import GloveLog
 from shared.nodes import DRONE
@@ -52,7 +52,9 @@ def flight_summary(
         "jumps": monitor.hand_jumps,
         "remarks": list(remarks),
     }
-    faults = _faults(outcome, {agent["id"]: agent["followed"] for agent in agents}, hand)
+    # Who calls a flight off before the hand is there gets what was asked for, and a refusal has its own words.
+    heard = outcome.interrupted or bool(outcome.refused) or monitor.stats.hand is not None
+    faults = _faults(outcome, {agent["id"]: agent["followed"] for agent in agents}, hand, heard=heard)
     return {
         "ok": not faults,
         "faults": faults,
@@ -84,15 +86,15 @@ def print_summary(summary: Json, console: Console) -> None:
         console.print(f"not ok: {fault}", soft_wrap=True)
 
 
-def _faults(outcome: Outcome, followed: Mapping[int, bool], hand: Json) -> list[str]:
+def _faults(outcome: Outcome, followed: Mapping[int, bool], hand: Json, *, heard: bool) -> list[str]:
     exits, failures = outcome.unexpected_exits, outcome.failed_starts
     return [
         *(f"{name} ended unexpectedly ({', '.join(map(exit_word, codes))})" for name, codes in exits.items()),
         *(f"{name} could not be started ({count} times)" for name, count in failures.items()),
-        *absences(followed, asked=hand["asked"], rejected=hand["rejected"]),
+        *absences(followed, heard=heard, asked=hand["asked"], rejected=hand["rejected"]),
         *contacts(outcome.referee),
         *(["what the referee saw is unknown"] if outcome.simulated and not outcome.referee else []),
-        *([] if outcome.landed else ["not every drone was seen to land"]),
+        *landing(outcome.stopped, landed=outcome.landed),
     ]
 
 

@@ -89,7 +89,7 @@ def _summary(
     followed = {drone: drone in record.followed for drone in ids}
     asked = any(sample.mode is Wish.FLY for sample in samples)
     without = sum(sample.mode is Wish.HOLD for sample in samples)
-    faults = [*absences(followed, asked=asked, rejected=without), *contacts(verdict)]
+    faults = [*absences(followed, heard=True, asked=asked, rejected=without), *contacts(verdict)]
     return {
         "ok": not faults,
         "faults": faults,

@@ -68,6 +68,11 @@ class PatientStream(SteadyStream):
     def flush(self) -> None:
         """Waits for nobody."""
 
+    def settle(self, limit_s: float) -> None:
+        """Waits until all that was written is with its reader, or, where that stalls, for `limit_s`."""
+        with self._queue.all_tasks_done:
+            self._queue.all_tasks_done.wait_for(lambda: not self._queue.unfinished_tasks, limit_s)
+
     def __enter__(self) -> Self:
         return self
 
@@ -79,3 +84,4 @@ class PatientStream(SteadyStream):
         while (text := self._queue.get()) is not None:
             super().write(text)
             super().flush()
+            self._queue.task_done()

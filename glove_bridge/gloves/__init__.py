@@ -3,9 +3,9 @@
 import importlib
 from typing import cast
 
-from glove_bridge.gloves.base import Glove
+from glove_bridge.gloves.base import Glove, GloveBackend
 from shared.errors import ConfigError
-from shared.uri import parse_uri
+from shared.uri import Uri, parse_uri
 
 BACKENDS = {
     "none": ("glove_bridge.gloves.absent", "AbsentGlove"),
@@ -26,10 +26,21 @@ def open_glove(uri: str) -> Glove:
     Raises:
         ConfigError: Unknown scheme, or a URI that its backend cannot use.
     """
+    backend, parsed = _backend(uri)
+    return backend(parsed)
+
+
+def check_glove(uri: str) -> None:
+    """Refuses what `open_glove` would refuse, and touches no device; errors as there."""
+    backend, parsed = _backend(uri)
+    backend.check(parsed)
+
+
+def _backend(uri: str) -> tuple[GloveBackend, Uri]:
     scheme, separator, _ = uri.partition("://")
     if scheme not in BACKENDS or not separator:
         known = ", ".join(f"{scheme}://" for scheme in BACKENDS)
         raise ConfigError(f"glove {uri!r}: no such backend; known: {known}")
     module, name = BACKENDS[scheme]
-    backend = getattr(importlib.import_module(module), name)
-    return cast(Glove, backend(parse_uri(uri, example="serial:///dev/ttyACM0?baud=115200")))
+    backend = cast(GloveBackend, getattr(importlib.import_module(module), name))
+    return backend, parse_uri(uri, example="serial:///dev/ttyACM0?baud=115200")

@@ -15,9 +15,14 @@ class AbsentGlove:
 
     def __init__(self, uri: Uri) -> None:
         """Takes a URI without options."""
-        uri.refuse_unknown()
+        self.check(uri)
         self._reports: list[Report] = []
         self.rejected: Counter[str] = Counter()
+
+    @staticmethod
+    def check(uri: Uri) -> None:
+        """See `GloveBackend.check`."""
+        uri.refuse_unknown()
 
     def play(self, pattern: Pattern, now_ns: int) -> None:  # noqa: ARG002  interface
         """See `Glove.play`."""

@@ -5,6 +5,7 @@ from collections import Counter
 from typing import NamedTuple, Protocol
 
 from glove_bridge.patterns.pattern import Pattern
+from shared.uri import Uri
 
 
 class Outcome(enum.StrEnum):
@@ -33,6 +34,18 @@ class Report(NamedTuple):
 
     outcome: Outcome
     at_ns: int
+
+
+class GloveBackend(Protocol):
+    """A class of gloves, as the backend table loads it."""
+
+    def __call__(self, uri: Uri) -> "Glove":
+        """Opens a glove."""
+        ...
+
+    def check(self, uri: Uri) -> None:
+        """Refuses a URI that it cannot use, and touches no device; raises `ConfigError`."""
+        ...
 
 
 class Glove(Protocol):

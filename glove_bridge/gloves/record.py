@@ -30,15 +30,12 @@ class RecordGlove(TimedGlove):
 
     def __init__(self, uri: Uri) -> None:
         super().__init__()
-        uri.refuse_unknown()
-        path = uri.path
-        if not path or "\0" in path:
-            raise ConfigError(f"{uri.text}: no file; for example record://patterns.jsonl")
-        try:
-            # Unbuffered: every frame is in the file when it starts, and closing cannot fail.
-            self._file: io.FileIO | None = io.FileIO(path, "ab")
-        except OSError as error:
-            raise ConfigError(f"record://{path}: cannot be written: {error}; choose another file") from error
+        self._file: io.FileIO | None = _open(uri)
+
+    @staticmethod
+    def check(uri: Uri) -> None:
+        """See `GloveBackend.check`; the file is there afterwards."""
+        _open(uri).close()
 
     def close(self) -> None:
         """See `Glove.close`."""
@@ -65,3 +62,15 @@ class RecordGlove(TimedGlove):
         if self._file is not None:
             self._file.close()
             self._file, self.fault = None, fault
+
+
+def _open(uri: Uri) -> io.FileIO:
+    uri.refuse_unknown()
+    path = uri.path
+    if not path or "\0" in path:
+        raise ConfigError(f"{uri.text}: no file; for example record://patterns.jsonl")
+    try:
+        # Unbuffered: every frame is in the file when it starts, and closing cannot fail.
+        return io.FileIO(path, "ab")
+    except OSError as error:
+        raise ConfigError(f"record://{path}: cannot be written: {error}; choose another file") from error

@@ -19,7 +19,7 @@ class ScreenGlove(TimedGlove):
     def __init__(self, uri: Uri | None = None) -> None:
         super().__init__()
         if uri is not None:
-            uri.refuse_unknown()
+            self.check(uri)
 
     def close(self) -> None:
         """See `Glove.close`."""

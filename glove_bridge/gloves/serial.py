@@ -8,7 +8,7 @@ from collections import Counter
 
 import attrs
 
-from glove_bridge.calibration import device_frames
+from glove_bridge.calibration import Calibration, device_frames
 from glove_bridge.calibration_file import load_calibration
 from glove_bridge.gloves.base import CLOSED, Outcome, Report
 from glove_bridge.gloves.serial_link import SerialLink
@@ -48,12 +48,8 @@ class SerialGlove:
     """
 
     def __init__(self, uri: Uri) -> None:
-        uri.refuse_unknown("baud", "link", "calibration")
-        if not uri.path:
-            raise ConfigError(f"{uri.text}: no device; for example serial:///dev/ttyACM0")
-        calibration = uri.options.get("calibration")
-        self._calibration = load_calibration(named(calibration) if calibration else None)
-        self.link = SerialLink(uri.path, link_timing(uri))
+        self._calibration, timing = _options(uri)
+        self.link = SerialLink(uri.path, timing)
         # Every pattern ends exactly once, in the order of the wishes: counting tells whom a report is about.
         self._asked = self._ended = self._given_up = 0
         self._overdue_ns = 0
@@ -61,6 +57,11 @@ class SerialGlove:
         self._reports: list[Report] = []
         self._offset_ns: int | None = None
         self._polled_ns = 0
+
+    @staticmethod
+    def check(uri: Uri) -> None:
+        """See `GloveBackend.check`."""
+        _options(uri)
 
     @property
     def connected(self) -> bool:
@@ -141,6 +142,14 @@ class SerialGlove:
         self._offset_ns = offset if self._offset_ns is None else max(self._offset_ns, offset)
         self._polled_ns = now_ns
         return self._offset_ns
+
+
+def _options(uri: Uri) -> tuple[Calibration, LinkTiming]:
+    uri.refuse_unknown("baud", "link", "calibration")
+    if not uri.path:
+        raise ConfigError(f"{uri.text}: no device; for example serial:///dev/ttyACM0")
+    calibration = uri.options.get("calibration")
+    return load_calibration(named(calibration) if calibration else None), link_timing(uri)
 
 
 def link_timing(uri: Uri) -> LinkTiming:

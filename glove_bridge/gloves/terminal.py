@@ -28,7 +28,7 @@ class TerminalGlove(TimedGlove):
     def __init__(self, uri: Uri | None = None, stream: TextIO | None = None) -> None:
         super().__init__()
         if uri is not None:
-            uri.refuse_unknown()
+            self.check(uri)
         self._stream: TextIO | None = stream or sys.stdout
         self._in_place = self._stream.isatty()
 

@@ -5,6 +5,7 @@ from collections import Counter
 
 from glove_bridge.gloves.base import Outcome, Report
 from glove_bridge.patterns.pattern import Frame, Pattern
+from shared.uri import Uri
 
 _NS_PER_MS = 1_000_000
 
@@ -26,6 +27,11 @@ class TimedGlove(ABC):
         self._started_ns = 0
         self._frame = -1
         self._reports: list[Report] = []
+
+    @staticmethod
+    def check(uri: Uri) -> None:
+        """See `GloveBackend.check`."""
+        uri.refuse_unknown()
 
     @property
     def connected(self) -> bool:

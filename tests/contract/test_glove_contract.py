@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -10,7 +11,7 @@ from typing import NamedTuple
 
 import pytest
 
-from glove_bridge.gloves import BACKENDS, open_glove
+from glove_bridge.gloves import BACKENDS, check_glove, open_glove
 from glove_bridge.gloves.base import Glove, Outcome, Report
 from glove_bridge.gloves.terminal import TerminalGlove, draw
 from glove_bridge.patterns import load_patterns
@@ -252,6 +253,22 @@ def test_a_terminal_that_is_gone_fails_patterns() -> None:
     ],
 )
 def test_a_wrong_uri_is_refused_with_a_hint(uri: str, expected: str) -> None:
-    with pytest.raises(ConfigError) as refused:
-        open_glove(uri)
-    assert expected in str(refused.value)
+    for door in (open_glove, check_glove):
+        with pytest.raises(ConfigError) as refused:
+            door(uri)
+        assert expected in str(refused.value)
+
+
+def test_a_check_touches_no_device(tmp_path: Path) -> None:
+    fifo = tmp_path / "port"
+    os.mkfifo(fifo)
+    for uri in (
+        "terminal://",
+        "none://",
+        "screen://",
+        f"record://{tmp_path}/felt",
+        f"serial://{fifo}?link=xbee",
+    ):
+        check_glove(uri)
+    with pytest.raises(OSError, match="No such device"):  # nobody has it open for reading
+        os.open(fifo, os.O_WRONLY | os.O_NONBLOCK)

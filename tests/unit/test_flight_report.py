@@ -76,6 +76,8 @@ def outcome(**changes: object) -> Outcome:
         "restarts": {"drone/1": 0},
         "failed_starts": {},
         "landed": True,
+        "stopped": (),
+        "interrupted": False,
         "refused": (),
         "simulated": True,
         "referee": REFEREE,
@@ -271,6 +273,10 @@ def test_the_summary_keeps_the_contract() -> None:
     ("changes", "why"),
     [
         ({"landed": False}, "not every drone was seen to land"),
+        (
+            {"landed": False, "stopped": (1, 3)},
+            "it was ended by STOP: the motors of drones 1, 3 were cut, wherever they were",
+        ),
         ({"unexpected_exits": {"drone-1": [-9, 1]}}, "drone-1 ended unexpectedly (SIGKILL, exit code 1)"),
         ({"failed_starts": {"drone-1": 3}}, "drone-1 could not be started (3 times)"),
         ({"referee": REFEREE | {"collisions": 1.0}}, "1 collisions"),
@@ -279,7 +285,7 @@ def test_the_summary_keeps_the_contract() -> None:
     ],
 )
 def test_what_makes_a_flight_not_ok_is_said(changes: dict[str, object], why: str) -> None:
-    summary = flight_summary(outcome(**changes), Swarm().monitor)
+    summary = flight_summary(outcome(**changes), Swarm().say(hand(Wish.GROUND)))
     assert (summary["ok"], summary["faults"]) == (False, [why])
     assert f"not ok: {why}" in printed(summary)
 
@@ -290,6 +296,13 @@ def test_a_flight_in_which_not_everybody_followed_the_hand_is_not_ok() -> None:
     assert summary["faults"] == ["the hand asked, but drones 3, 4 never followed it"]
     assert [agent["followed"] for agent in summary["agents"]] == [True, True, False, False]
     assert summary["hand"] == {"asked": True, "rejected": 0, "jumps": 0, "remarks": []}
+
+
+def test_a_flight_whose_hand_was_never_heard_is_not_ok_but_where_it_was_called_off() -> None:
+    summary = flight_summary(outcome(), Swarm().say(state(1)))
+    assert summary["faults"] == ["nobody flew: no hand was ever heard; its log is relay.log"]
+    assert flight_summary(outcome(interrupted=True), Swarm().monitor)["ok"] is True
+    assert flight_summary(outcome(refused=("bridge",)), Swarm().monitor)["faults"] == []
 
 
 def test_nobody_is_to_blame_where_the_hand_never_asked() -> None:
@@ -312,7 +325,7 @@ def test_a_hand_of_which_every_pose_is_impossible_makes_no_flight() -> None:
 
 
 def test_without_a_simulated_world_the_referees_numbers_are_unknown() -> None:
-    summary = flight_summary(outcome(simulated=False, referee={}), Swarm().monitor)
+    summary = flight_summary(outcome(simulated=False, referee={}), Swarm().say(hand(Wish.GROUND)))
     assert summary["ok"] is True
     assert summary["min_distance_m"] is None
     assert summary["collisions"] is None

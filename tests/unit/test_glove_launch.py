@@ -195,3 +195,11 @@ def test_what_the_glove_cannot_make_felt_is_told_once() -> None:
     log.add(event("DRONE_LOST", "failed"))
     log.add(event("FENCE", "started", START))
     assert panel.unfelt(log.failed, bridge_status(1.0)) == ["the glove can be felt", "NOT FELT: drone lost"]
+
+
+def test_a_glove_that_no_bridge_could_open_is_refused_before_anything_starts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["up", "rhombus", "--glove", "cloud://", "--runs", str(tmp_path / "runs")]) == 2
+    assert "glove 'cloud://': no such backend" in capsys.readouterr().err
+    assert not (tmp_path / "runs").exists()
