@@ -11,7 +11,8 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from observer.report.record import ROW_HZ, FlightRecord, Played, mapped_hand, resample
-from observer.trace.read import Record, Trace
+from observer.trace.order import Record
+from observer.trace.read import Trace
 from shared.clock import NS_PER_S
 from shared.cylinders import columns_of
 from shared.errors import ConfigError

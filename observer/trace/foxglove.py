@@ -9,7 +9,8 @@ from cattrs import Converter
 from mcap.writer import Writer
 
 from observer.trace.foxglove_types import Pose, PoseInFrame, Quaternion, SceneUpdate, Time, Vector3
-from observer.trace.read import Record, Trace
+from observer.trace.order import Record
+from observer.trace.read import Trace
 from observer.trace.scene import FRAME, Scene
 from observer.trace.schemas import Kind, json_fields, json_schema
 from shared.clock import NS_PER_S

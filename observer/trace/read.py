@@ -9,12 +9,13 @@ damaged chunk is skipped, and so are bytes that are no records.
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from observer.swarm import LATEST, RUNS, SCENARIO_FILE
 from observer.trace import mcap_file
 from observer.trace.layout import SCENARIO, trace_files
 from observer.trace.mcap_file import ENCODING, DamageError, McapFile, MessageRecord
+from observer.trace.order import Record, TimeOrder
 from observer.trace.survey import Survey, described, look_through
 from shared.codec import decode, decode_on
 from shared.config import structure_scenario
@@ -30,24 +31,6 @@ MOST_IN_MEMORY = 4_000_000
 
 _RETIRED = (("net", "pointer_port"),)
 """Keys of the scenario that earlier recorders wrote, and that mean nothing any more."""
-
-
-class Record(NamedTuple):
-    """One recorded payload.
-
-    Attributes:
-        key: The key it was sent on, without the swarm's name.
-        payload: The bytes as they were sent.
-        seq: The publisher's `seq`, modulo 2^32; 0 if the payload is no valid message.
-        publish_ns: The publisher's stamp (its clock); `log_ns` if the payload is no valid message.
-        log_ns: When it arrived at the recorder (the recorder's clock).
-    """
-
-    key: str
-    payload: bytes
-    seq: int
-    publish_ns: int
-    log_ns: int
 
 
 class Trace:
@@ -82,11 +65,11 @@ class Trace:
         self.metadata, self.scenario, self._scenario_fault = _scenario(files, self._surveys)
 
     def records(self) -> Iterator[Record]:
-        """Yields every payload in the order in which they were recorded, as far as readable."""
+        """Yields every payload, file by file and there by the time of its arrival, as far as readable."""
         self._begin()
         for file, survey in zip(self.files, self._surveys, strict=True):
             before = self._read
-            yield from self._records_in(file, survey)
+            yield from self._order.sort(self._records_in(file, survey))
             self.dropped += survey.dropped
             self.missing += max(0, (survey.messages or 0) - (self._read - before))
 
@@ -118,10 +101,11 @@ class Trace:
         told: dict[str, object] = {
             "it has no end: its recorder was killed or still runs": self.truncated,
             self._scenario_fault: self._scenario_fault,
-            f"{self.damaged} damaged chunks were skipped": self.damaged,
+            f"{self.damaged} damaged chunk{'s were' if self.damaged > 1 else ' was'} skipped": self.damaged,
             f"{self.lost} damaged bytes were skipped": self.lost,
             f"{self.missing} messages that it counts are not in it": self.missing,
             f"its recorder could not keep up and dropped {self.dropped} messages": self.dropped,
+            f"{self._order.late} messages are far out of order": self._order.late,
             f"{self._nameless} messages are on channels whose definition is damaged": self._nameless,
         }
         return [
@@ -132,6 +116,7 @@ class Trace:
     def _begin(self) -> None:
         self.damaged = self.lost = self.missing = self.dropped = self._nameless = self._read = 0
         self.foreign: Counter[str] = Counter()
+        self._order = TimeOrder()
 
     def _records_in(self, path: Path, survey: Survey) -> Iterator[Record]:
         channels = dict(survey.channels)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import attrs
 
 from observer.histogram import Histogram, Quantiles
-from observer.trace.read import Record
+from observer.trace.order import Record
 from shared.clock import NS_PER_S, Clock
 from shared.errors import DecodeError
 from shared.topics import Delivery, topic_of
@@ -47,10 +47,10 @@ def replay(
     """
     publishers: dict[str, Publish] = {}
     lateness, messages, left_out = Histogram(), 0, 0
-    start_ns: int = clock()
-    first_ns: int | None = None
-    for record in records:
-        first_ns = record.log_ns if first_ns is None else first_ns
+    start_ns = first_ns = 0
+    for number, record in enumerate(records):
+        if number == 0:  # reading up to it may have taken its time
+            start_ns, first_ns = clock(), record.log_ns
         due_ns = start_ns + round((record.log_ns - first_ns) / speed)
         while (early_ns := due_ns - clock()) > 0 and not stopping.is_set():
             # No wait is as long as two times in a file can be apart.

@@ -30,6 +30,8 @@ STRAY_NS = 5 * NS_PER_S
 """Stamps stray from the arrivals by no more than this, beyond what the clocks differ by."""
 LONGEST_S = 12 * 3600
 """A recording that takes longer is none of a flight."""
+SLOWEST_NS = 2 * NS_PER_S
+"""Poses that are usually farther apart than this are none of a motion; milliseconds read as seconds are."""
 LONELY_NS = 60 * NS_PER_S
 """A stamp so far from all others is wrong."""
 _UNIT = (0.9, 1.1)
@@ -127,11 +129,17 @@ def check(found: Found, name: str, room: float = ROOM) -> Checked:
     left.out(np.array(~np.isfinite(found.position).all(axis=1)), NO_NUMBER)
     _keep_in_room(found, left, name, room)
     turns = _keep_turned(found, left)
-    t_ns, by_arrival = _keep_in_time(found, left)
+    t_ns, by_arrival = _keep_in_time(found, left, name)
     rows = np.flatnonzero(left.good)
     if len(rows) < 2:
         why = "; ".join(filter(None, (*found.remarks, left.words()))) or "fewer than two poses"
         raise ConfigError(f"{name}: nothing to go by: {why}")
+    usual = float(np.median(np.diff(t_ns[rows])))
+    if usual > SLOWEST_NS:
+        raise ConfigError(
+            f"{name}: {usual / NS_PER_S:.1f} s from one pose to the next; are the times milliseconds?"
+            " Write seconds"
+        )
     if t_ns[rows[-1]] - t_ns[rows[0]] > LONGEST_S * NS_PER_S:
         raise ConfigError(f"{name}: it takes more than {LONGEST_S // 3600} hours; take a part of it")
     position = found.position[rows]
@@ -212,7 +220,7 @@ def _keep_turned(found: Found, left: _LeftOut) -> bool:
     return True
 
 
-def _keep_in_time(found: Found, left: _LeftOut) -> tuple[Stamps, bool]:
+def _keep_in_time(found: Found, left: _LeftOut, name: str) -> tuple[Stamps, bool]:
     """Leaves out what is out of time; returns the times, ns, and whether they are those of arrival."""
     rows = np.flatnonzero(left.good)
     by_stamp = np.zeros_like(left.good)
@@ -225,6 +233,9 @@ def _keep_in_time(found: Found, left: _LeftOut) -> tuple[Stamps, bool]:
             left.out(~by_arrival, OUT_OF_TIME)
             return found.arrival_ns, True
     left.out(found.t_ns == NO_STAMP, NO_TIME)
+    if 2 * np.count_nonzero(by_stamp) < np.count_nonzero(left.good):
+        left.out(~by_stamp, OUT_OF_TIME)
+        raise ConfigError(f"{name}: most poses come at no time: {left.words()}; sort them by time")
     left.out(~by_stamp, OUT_OF_TIME)
     return found.t_ns, False
 

@@ -1,4 +1,8 @@
-"""Rows of CSV files, plain or gzipped, in any encoding, and no more of them than a stated number."""
+"""Rows of CSV files, plain or gzipped, in any encoding, and no more of them than a stated number.
+
+Cells are separated by commas, semicolons or tabs: whatever separates the most in the first line, or what a
+line `sep=;` before it says, as spreadsheets write it.
+"""
 
 import csv
 import gzip
@@ -6,7 +10,7 @@ import io
 import zlib
 from collections.abc import Generator, Iterator
 from contextlib import ExitStack
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 
 from shared.errors import ConfigError
@@ -18,6 +22,9 @@ MOST_CHARACTERS = 1 << 29
 """Of one file, unpacked."""
 LONGEST_LINE = 1 << 16
 """Characters."""
+
+_SEPARATORS = ",;\t"
+_SAID = "sep="
 
 _GZIP = b"\x1f\x8b"
 
@@ -33,10 +40,12 @@ class CsvRows:
         most: Lines at most.
 
     Attributes:
+        separator: What stands between cells, from the first row on.
         remarks: What is not there, in words, as far as has been read.
     """
 
     def __init__(self, path: Path, most: int) -> None:
+        self.separator = ","
         self.remarks: list[str] = []
         self._path = path
         self._most = most
@@ -45,14 +54,22 @@ class CsvRows:
         end = 0
         try:
             with ExitStack() as files:
-                reader = csv.reader(self._lines(_open(files, self._path)))
+                lines = self._lines(_open(files, self._path))
+                head = list(_head(lines))
+                self.separator, is_said = _separator(head[-1] if head else "")
+                reader = csv.reader(chain(head, lines), delimiter=self.separator)
                 for cells in reader:
                     begin, end = end + 1, reader.line_num
-                    if any(cells):
+                    if any(cells) and not (is_said and end == len(head)):
                         yield begin, [cell.strip() for cell in cells]
         except EOFError:
             self.remarks.append(f"the file is cut off after line {end}")
-        except (OSError, zlib.error, UnicodeError, csv.Error) as error:
+        except UnicodeError as error:
+            raise ConfigError(
+                f"{self._path}: no text in UTF-8 or UTF-16, from about line {end + 1} on ({error}); a hand is a"
+                " table of text, saved as UTF-8"
+            ) from error
+        except (OSError, zlib.error, csv.Error) as error:
             raise ConfigError(
                 f"{self._path.absolute()}: cannot be read as CSV after line {end}: {error}"
             ) from error
@@ -72,6 +89,22 @@ class CsvRows:
                     f" and {MOST_CHARACTERS >> 20} MiB of text are read"
                 )
             yield line
+
+
+def _head(lines: Iterator[str]) -> Iterator[str]:
+    """Yields lines to the first that is not blank."""
+    for line in lines:
+        yield line
+        if line.strip():
+            return
+
+
+def _separator(line: str) -> tuple[str, bool]:
+    """Tells by the first line what separates cells, and whether it is a line that says just that."""
+    said = line.strip(" \r\n").strip('"')
+    if said.lower().startswith(_SAID) and len(said) == len(_SAID) + 1 and said[-1] in _SEPARATORS:
+        return said[-1], True
+    return max(_SEPARATORS, key=line.count), False
 
 
 def _open(files: ExitStack, path: Path) -> io.TextIOWrapper:

@@ -13,6 +13,10 @@ from shared.errors import ConfigError
 from shared.recordings.csv_rows import MOST_LINES, CsvRows
 from shared.recordings.track import NO_STAMP, Stamps, Vec
 
+_LONGEST_STAMP = 19
+"""Digits of the largest 64 bit integer."""
+_LONGEST_SHOWN = 40
+"""Characters of a wrong cell that are shown."""
 LONGEST_TEXT = 200
 """Characters of a cell that is kept as text."""
 
@@ -63,6 +67,7 @@ def read_table(
     with closing(iter(rows)) as content:
         _, header = next(content, (0, []))
         columns = _Columns(path, header, integers, numbers, texts)
+        columns.has_decimal_commas = rows.separator != ","
         for line, cells in content:
             if not columns.add(line, cells):
                 if next(content, None):
@@ -102,6 +107,7 @@ class _Columns:
         self._last = max((*self._integers, *self._numbers, *self._texts), default=0)
         self._stamps, self._reals, self._lines = array("q"), array("d"), array("q")
         self._names: list[list[str]] = []
+        self.has_decimal_commas = False
 
     def add(self, line: int, cells: list[str]) -> bool:
         """Takes a row; says whether it has all of the columns."""
@@ -109,7 +115,10 @@ class _Columns:
             return False
         try:
             self._stamps.extend([_stamp(cells[place]) for place in self._integers])
-            self._reals.extend([_number(cells[place]) for place in self._numbers])
+            texts = [cells[place] for place in self._numbers]
+            if self.has_decimal_commas:
+                texts = [text.replace(",", ".") for text in texts]
+            self._reals.extend(map(_number, texts))
         except ValueError as error:
             raise ConfigError(
                 f"{self._path}: line {line}: {error}; expected numbers for {self._wanted}"
@@ -142,17 +151,25 @@ def _places(path: Path, header: list[str], wanted: Sequence[str]) -> list[int]:
             f"{path}: no column {', '.join(missing)}; expected the header {','.join(wanted)}, "
             f"found {','.join(header)[:LONGEST_TEXT]}"
         )
+    if twice := [name for name in wanted if header.count(name) > 1]:
+        raise ConfigError(f"{path}: more than one column {', '.join(twice)}; rename the others")
     return [header.index(name) for name in wanted]
 
 
 def _stamp(text: str) -> int:
     if not text:
         return NO_STAMP
-    stamp = int(text)
-    if not 0 <= stamp < 2**63:
-        raise ValueError(f"{text!r} is no time in ns")
+    stamp = int(text) if text.isascii() and text.isdecimal() and len(text) <= _LONGEST_STAMP else 2**63
+    if stamp >= 2**63:
+        raise ValueError(f"{text[:_LONGEST_SHOWN]!r} is no time in ns")
     return stamp
 
 
 def _number(text: str) -> float:
-    return float(text) if text else np.nan
+    if not text:
+        return np.nan
+    try:
+        # Python groups digits by underscores; nobody else does.
+        return float("" if "_" in text else text)
+    except ValueError:
+        raise ValueError(f"{text[:_LONGEST_SHOWN]!r} is no number") from None

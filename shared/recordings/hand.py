@@ -17,12 +17,21 @@ BAG_TOPIC = "/vicon/glove/glove"
 LATEST_S = 4e9
 """Largest time in a table, s: up to it, until 2096, times are 64 bits of ns apart at most."""
 
+MOST_YAW = 4.0 * np.pi
+"""Largest heading in a table, rad: nobody turns on the spot twice, and degrees are soon more."""
+
 _BAG = b"#ROSBAG V"
 _MOST_NAMED = 20
+_ROS2_FILE = "metadata.yaml"
+_READ = "a hand is read from a ROS 1 bag or a CSV file"
 _FOREIGN = {
     b"\x89MCAP0": "an MCAP file",
     b"SQLite format 3": "a database, as of ROS 2",
-    b"PK\x03\x04": "a zip file",
+    b"PK\x03\x04": "a zip file, as of a spreadsheet",
+    b"BZh": "packed by bzip2",
+    b"\xfd7zXZ": "packed by xz",
+    b"\x28\xb5\x2f\xfd": "packed by zstd",
+    b"\x02P": "a C3D file",
 }
 """What a file begins with -> what it is; hands are not read from these."""
 
@@ -56,6 +65,8 @@ def read_hand(path: Path, topic: str | None = None) -> RecordedBody:
             " or a CSV file with the header t,x,y,z[,yaw]"
         )
     if path.is_dir():
+        if (path / _ROS2_FILE).is_file():
+            raise ConfigError(f"{path}: a bag of ROS 2; {_READ}")
         checked = read_body(path / HAND_FILE)
         return RecordedBody(checked, checked.report.remarks)
     head = _head(path)
@@ -63,7 +74,7 @@ def read_hand(path: Path, topic: str | None = None) -> RecordedBody:
         return _read_bag_hand(path, topic)
     for magic, kind in _FOREIGN.items():
         if head.startswith(magic):
-            raise ConfigError(f"{path.absolute()}: {kind}; a hand is read from a ROS 1 bag or a CSV file")
+            raise ConfigError(f"{path}: {kind}; {_READ}")
     checked = check(read_csv(path), str(path))
     return RecordedBody(checked, checked.report.remarks)
 
@@ -78,10 +89,16 @@ def read_csv(path: Path) -> Found:
     table = read_table(path, numbers=("t", "x", "y", "z", *(("yaw",) if has_yaw else ())))
     t, half_yaw = table.numbers[:, 0], table.numbers[:, 4] / 2 if has_yaw else None
     said = np.abs(t) <= LATEST_S
+    if 2 * np.count_nonzero(said) < np.count_nonzero(np.isfinite(t)):
+        raise ConfigError(
+            f"{path}: times beyond {LATEST_S:.0e} s; are they milli- or nanoseconds? Write seconds"
+        )
     first = t[said][0] if said.any() else 0.0
     t_ns = np.rint(np.where(said, t - first, 0.0) * NS_PER_S).astype(np.int64)
     quaternion = None
     if half_yaw is not None:
+        if _most(half_yaw) > MOST_YAW / 2:
+            raise ConfigError(f"{path}: headings beyond {MOST_YAW:.1f} rad; are they degrees? Write radians")
         zero = np.zeros_like(half_yaw)
         with np.errstate(invalid="ignore"):
             quaternion = np.column_stack((zero, zero, np.sin(half_yaw), np.cos(half_yaw)))
@@ -109,6 +126,11 @@ def relative_yaw(quaternion: Vec) -> Vec:
     return relative
 
 
+def _most(values: Vec) -> float:
+    """Returns the largest magnitude, whatever else stands there."""
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
 def _head(path: Path) -> bytes:
     try:
         with path.open("rb") as stream:
@@ -128,8 +150,11 @@ def _read_bag_hand(path: Path, topic: str | None) -> RecordedBody:
     if chosen not in bodies:
         known = {name: body.kind for name, body in bodies.items()} or others
         shown = ", ".join(f"{name} ({kind})" for name, kind in sorted(known.items())[:_MOST_NAMED])
+        if len(known) > _MOST_NAMED:
+            shown += f" and {len(known) - _MOST_NAMED} more"
         hint = "choose with topic= one of" if bodies else "there are no poses in it, but"
+        what = f"{hint} {shown}" if known else "nothing is in it"
         why = "".join(f"; {remark}" for remark in unread)
-        raise ConfigError(f"{path}: no hand on topic {chosen}; {hint} {shown or 'nothing at all'}{why}")
+        raise ConfigError(f"{path}: no hand on topic {chosen}; {what}{why}")
     checked = check(bodies[chosen].found, f"{path}, {chosen}")
     return RecordedBody(checked, (*remarks, *checked.report.remarks))

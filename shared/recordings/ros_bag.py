@@ -121,6 +121,9 @@ class _Body:
     def found(self, remarks: tuple[str, ...]) -> Found:
         times = np.array(self._times, dtype=np.int64).reshape(-1, 2)
         numbers = np.array(self._numbers, dtype=np.float64).reshape(-1, 7)
+        # A bag keeps no order of its messages; those who read one sort them by arrival.
+        order = np.argsort(times[:, 1], kind="stable")
+        times, numbers = times[order], numbers[order]
         return Found(
             t_ns=times[:, 0],
             position=numbers[:, :3],
@@ -150,8 +153,8 @@ def _deserializer() -> Deserialize:
 def _remarks(path: Path, bag: BagRecords, bodies: _Bodies) -> tuple[str, ...]:
     told = {
         f"read up to byte {bag.cut_at} of {path.stat().st_size}: it is cut off there": bag.cut_at is not None,
-        f"{bag.damaged} damaged chunks were skipped": bag.damaged > 0,
-        f"{bodies.unreadable} messages could not be read": bodies.unreadable > 0,
+        f"damaged chunks were skipped: {bag.damaged}": bag.damaged > 0,
+        f"messages could not be read: {bodies.unreadable}": bodies.unreadable > 0,
         f"{bodies.refused} poses of more than {MOST_BODIES} bodies were left out": bodies.refused > 0,
     }
     return tuple(text for text, is_so in told.items() if is_so)

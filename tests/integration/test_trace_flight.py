@@ -20,7 +20,8 @@ from deploy.launcher.process_table import resolve_scenario
 from observer.link_stats import SwarmLinks
 from observer.swarm import open_observer
 from observer.trace.layout import trace_files
-from observer.trace.read import Record, open_trace
+from observer.trace.order import Record
+from observer.trace.read import open_trace
 from observer.trace.replay import PREFIX
 from observer.trace.write import TraceWriter
 from shared.clock import NS_PER_S, system_clock

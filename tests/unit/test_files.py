@@ -1,10 +1,12 @@
 """Files as editors leave them: marks, UTF-16, foreign line ends; and ones that have no end."""
 
 import gzip
+import re
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from glove_bridge.calibration_file import SHIPPED, load_calibration
@@ -44,7 +46,7 @@ def test_a_hand_is_read_in_any_encoding(tmp_path: Path, encoding: str, *, packed
     hand = read_hand(path)
     assert len(hand.checked.rows) == 60
     path.write_bytes((ROWS + "1.5,0,oops,1.2,ü\n").encode(encoding))
-    with pytest.raises(ConfigError, match="line 62: could not convert string to float: 'oops'"):
+    with pytest.raises(ConfigError, match="line 62: 'oops' is no number"):
         read_hand(path)
 
 
@@ -62,6 +64,53 @@ def test_every_toml_is_read_in_any_encoding(tmp_path: Path, file: Path, encoding
     path = tmp_path / file.name
     path.write_bytes(file.read_text(encoding="utf-8").encode(encoding))
     assert load(path) == load(file)
+
+
+@pytest.mark.parametrize("said", ["", "sep={}\n", '"sep={}"\r\n'])
+@pytest.mark.parametrize(("separator", "comma"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")])
+def test_a_table_of_any_spreadsheet_is_read(tmp_path: Path, separator: str, comma: str, said: str) -> None:
+    cells = ("0.5", '"a,b;c"', "-1e-1", "1.25")
+    rows = [("t", "x", "note", "y", "z"), *((f"{row / 60:.4f}", *cells) for row in range(60))]
+    lines = [separator.join(cell.replace(".", comma) for cell in row) for row in rows]
+    path = tmp_path / "take.csv"
+    path.write_text(said.format(separator) + "\n".join(lines) + "\n", newline="")
+    hand = read_hand(path)
+    assert hand.remarks == ()
+    assert np.allclose(hand.checked.track.position, [0.5, -0.1, 1.25])
+    with path.open("a", newline="") as stream:
+        stream.write(separator.join(("2", "0_5", "", "0", "1")) + "\n")
+    with pytest.raises(ConfigError, match=f"line {62 + bool(said)}: '0_5' is no number"):
+        read_hand(path)
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (b"BZh91AY&SY", "packed by bzip2; a hand is read from"),
+        (b"\xfd7zXZ\0\0\4", "packed by xz"),
+        (b"\x02P\0\0", "a C3D file"),
+        ("t,x,y,z,größe\n".encode("latin-1"), "no text in UTF-8 or UTF-16, from about line 1 on"),
+        (b"t,x,y,z,x\n0,0,0,1,0\n", "more than one column x; rename the others"),
+        (
+            b"t,x,y,z\n" + b"".join(b"%d,0,0,1\n" % (row * 16) for row in range(99)),
+            "milliseconds? Write seconds",
+        ),
+        (b"t,x,y,z\n" + b"".join(b"%d,0,0,1\n" % (10**18 + row) for row in range(9)), "or nanoseconds?"),
+        (b"t,x,y,z,yaw\n" + b"".join(b"%g,0,0,1,%d\n" % (row / 60, row) for row in range(99)), "degrees?"),
+        (b"t,x,y,z\n" + b"".join(b"%g,0,0,1\n" % (-row / 60) for row in range(99)), "sort them by time"),
+    ],
+)
+def test_what_is_no_hand_of_ours_is_named(tmp_path: Path, data: bytes, why: str) -> None:
+    path = tmp_path / "take"
+    path.write_bytes(data)
+    with pytest.raises(ConfigError, match=re.escape(why)):
+        read_hand(path)
+
+
+def test_a_bag_of_ros_2_is_named(tmp_path: Path) -> None:
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")
+    with pytest.raises(ConfigError, match="a bag of ROS 2; a hand is read from a ROS 1 bag"):
+        read_hand(tmp_path)
 
 
 def test_a_token_is_read_as_notepad_writes_it(tmp_path: Path) -> None:

@@ -145,7 +145,9 @@ def test_lines_of_the_file_are_named_where_it_has_any() -> None:
             evolve(GOOD, t_ns=T[:0], position=GOOD.position[:0], quaternion=None, arrival_ns=None),
             "fewer than two",
         ),
-        (Found(t_ns=np.arange(1_000) * 50 * NS_PER_S, position=np.zeros((1_000, 3))), "more than 12 hours"),
+        (Found(t_ns=np.arange(50_000) * NS_PER_S, position=np.zeros((50_000, 3))), "more than 12 hours"),
+        (Found(t_ns=np.arange(90) * 16 * NS_PER_S, position=np.zeros((90, 3))), "16.0 s from .* milliseconds"),
+        (without_arrival(evolve(GOOD, t_ns=T[::-1].copy())), "come at no time: 299 .* sort them by time"),
     ],
 )
 def test_what_is_no_recording_is_refused(found: Found, expected: str) -> None:

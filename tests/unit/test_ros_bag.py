@@ -52,6 +52,14 @@ def test_a_bag_without_poses_names_what_is_in_it(tmp_path: Path) -> None:
         read_hand(bag)
 
 
+def test_a_bag_is_read_in_the_order_of_arrival(tmp_path: Path) -> None:
+    poses = steady(60)
+    mixed = poses[40:] + poses[:40]
+    hand = read_hand(write_bag(tmp_path / "a.bag", {BAG_TOPIC: Body(bags.POSE, mixed)}))
+    assert hand.remarks == ()
+    assert hand.checked.track.t_ns.tolist() == [pose.stamp_ns for pose in poses]
+
+
 def test_stamps_of_zero_give_way_to_arrival_times(tmp_path: Path) -> None:
     poses = [pose._replace(stamp_ns=0) for pose in steady(60)]
     hand = read_hand(write_bag(tmp_path / "a.bag", {BAG_TOPIC: Body(bags.POSE, poses)}))
@@ -146,7 +154,7 @@ def test_a_chunk_that_grows_beyond_bounds_is_left_out(tmp_path: Path) -> None:
     path.write_bytes(MAGIC + bomb + good.removeprefix(MAGIC))
     hand = read_hand(path)
     assert len(hand.checked.rows) == 60
-    assert hand.remarks == ("1 damaged chunks were skipped",)
+    assert hand.remarks == ("damaged chunks were skipped: 1",)
 
 
 def test_a_message_that_is_none_is_counted(tmp_path: Path) -> None:
@@ -156,4 +164,4 @@ def test_a_message_that_is_none_is_counted(tmp_path: Path) -> None:
     bag.write_bytes(bag.read_bytes().replace(length + b"world", wrong + b"world", 1))
     hand = read_hand(bag)
     assert len(hand.checked.rows) == 59
-    assert hand.remarks[0] == "1 messages could not be read"
+    assert hand.remarks[0] == "messages could not be read: 1"

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from observer.trace.layout import trace_files
-from observer.trace.read import Record, open_trace
+from observer.trace.order import Record
+from observer.trace.read import open_trace
 from observer.trace.schemas import json_schema
 from observer.trace.write import MOST_KEYS, TraceWriter
 from shared.codec import encode

@@ -21,6 +21,7 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from observer.trace.layout import SCENARIO as SCENARIO_RECORD
 from observer.trace.mcap_file import CHUNK
+from observer.trace.order import Record, TimeOrder
 from observer.trace.read import MOST_IN_MEMORY, Trace, open_trace
 from observer.trace.write import TraceWriter
 from shared.config import dump_scenario
@@ -31,7 +32,7 @@ SENT = flight(60)
 MB = 1 << 20
 
 
-def rewritten(path: Path, *, metadata_last: bool = False, **options: Any) -> bytes:
+def rewritten(path: Path, *, metadata_last: bool = False, backwards: bool = False, **options: Any) -> bytes:
     """Writes a trace anew as another tool would: same messages, other numbers, other layout."""
     out = BytesIO()
     writer = Writer(out, **options)
@@ -49,7 +50,7 @@ def rewritten(path: Path, *, metadata_last: bool = False, **options: Any) -> byt
         tell()
     writer.register_channel("/foreign", "cdr", 0)
     channels: dict[str, int] = {}
-    for _, channel, message in found:
+    for _, channel, message in reversed(found) if backwards else found:
         if channel.topic not in channels:
             channels[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, 0)
         number = channels[channel.topic]
@@ -72,6 +73,7 @@ LAYOUTS: dict[str, dict[str, Any]] = {
     "lz4": {"compression": CompressionType.LZ4, "chunk_size": 2_000},
     "not packed": {"compression": CompressionType.NONE, "chunk_size": 2_000},
     "no checksums": {"enable_crcs": False, "chunk_size": 2_000},
+    "last message first": {"backwards": True, "chunk_size": 2_000},
     "metadata last": {"metadata_last": True, "chunk_size": 2_000},
     "no chunks, metadata last": {"metadata_last": True, "use_chunking": False},
 }
@@ -90,6 +92,26 @@ def test_what_other_tools_make_of_a_trace_is_the_same_trace(tmp_path: Path, layo
     assert list(trace.records()) == original
     assert (trace.faults, trace.scenario) == ([], SCENARIO)
     assert [message for _, message in trace.messages()]
+
+
+def a_record(number: int, log_ns: int) -> Record:
+    return Record("human/hand", bytes([number % 256]), number, log_ns, log_ns)
+
+
+@given(st.lists(st.integers(0, 2**64 - 1) | st.integers(0, 5), max_size=60), st.integers(1, 60))
+def test_records_come_by_time_and_who_is_too_far_away_is_counted(times: list[int], window: int) -> None:
+    records = [a_record(number, log_ns) for number, log_ns in enumerate(times)]
+    order = TimeOrder(window)
+    found = list(order.sort(iter(records)))
+    assert sorted(found, key=lambda one: one.seq) == records
+    ordered = sorted(records, key=lambda one: one.log_ns)
+    if len(times) <= window:
+        assert (found, order.late) == (ordered, 0)
+    newest, late = -1, 0
+    for one in found:
+        late += one.log_ns < newest
+        newest = max(newest, one.log_ns)
+    assert order.late == late
 
 
 def test_messages_in_other_encodings_are_named_and_left_out(tmp_path: Path) -> None:
