@@ -82,7 +82,7 @@ class Air:
             return
         # A late one, overtaken by a newer one or by a new process: counted in flight, nothing else.
         with contextlib.suppress(DecodeError):
-            hand_over(agent.senses, message, tick_ns(tick, self._rate))
+            hand_over([agent.senses], message, tick_ns(tick, self._rate))
 
     def _draw(self) -> float:
         if not self._drawn:

@@ -5,7 +5,7 @@ published state reaches its listeners at once, and at the end the bodies move on
 inputs give the same bytes, and messages handed over as they are give the same flight as their bytes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 
 import numpy as np
@@ -30,18 +30,24 @@ _HAND_KEY = HAND.key()
 _COMMANDS = dict.fromkeys(Mode, FLY) | {Mode.STOP: CUT, Mode.GROUND: IDLE}
 
 
-def hand_over(senses: Senses, message: HandSample | DroneState | Places, now_ns: int) -> None:
+def hand_over(listeners: Iterable[Senses], message: HandSample | DroneState | Places, now_ns: int) -> None:
     """Hands a message over as it is.
 
     Raises:
         DecodeError: It is not newer than the last one of its kind.
     """
     if isinstance(message, HandSample):
-        senses.hear_hand(Sensed(message, now_ns))
+        sample = Sensed(message, now_ns)
+        for senses in listeners:
+            senses.hear_hand(sample)
     elif isinstance(message, DroneState):
-        senses.hear_drone(Sensed(message, now_ns))
+        state = Sensed(message, now_ns)
+        for senses in listeners:
+            senses.hear_drone(state)
     else:
-        senses.hear_places(Sensed(message, now_ns))
+        places = Sensed(message, now_ns)
+        for senses in listeners:
+            senses.hear_places(places)
 
 
 class Lockstep:
@@ -76,6 +82,7 @@ class Lockstep:
         ]
         introduce(self._agents, formation, self.flyers)
         self._ids = formation.ids
+        self._keys = [DRONE_STATE.key(id=drone) for drone in formation.ids]
         self._near: list[frozenset[int]] = []
         self._listeners: dict[str, list[Senses]] = {}
 
@@ -96,7 +103,7 @@ class Lockstep:
         for row in self._order:
             agent = self._agents[row]
             states[row] = agent.step(now, pose_of(self.flyers[row], 1.0, self.tick), 0.0)
-            self._publish(DRONE_STATE.key(id=states[row].id), states[row], now)
+            self._publish(self._keys[row], states[row], now)
             if (told := agent.places()) is not None:
                 self._publish(PLACES.key(id=told.id), told, now)
         ordered = [states[row] for row in range(len(states))]
@@ -127,8 +134,7 @@ class Lockstep:
             for senses in self._listeners[key]:
                 senses.take({key: [Arrival(payload, now_ns)]})
         else:
-            for senses in self._listeners[key]:
-                hand_over(senses, message, now_ns)
+            hand_over(self._listeners[key], message, now_ns)
 
 
 def fly_lockstep(
