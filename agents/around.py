@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 from agents.company import Company
-from agents.control.modes import is_airborne
+from agents.control.modes import GROUND, is_airborne
 from agents.control.safety.demands import SafetySettings
 from agents.control.safety.encounter import (
     SILENT_AFTER,
@@ -34,12 +34,15 @@ def drones_around(company: Company, keep: Mapping[int, Clearance], lag: float, n
         state = sensed.message
         heard = sensed.age(now_ns)
         age = heard + state.pose_age
-        if age > SILENT_AFTER:
+        # Who stands on the ground says so less often, and stays there.
+        if age > SILENT_AFTER and state.mode is not GROUND:
             found.append(drone_silent(state.position, state.velocity, age, keep[state.id], lag))
             continue
         yields = is_airborne(state.mode) and state.id not in company.deaf
         ahead, pace = state.ahead or state.position, state.pace or state.velocity
-        found.append(drone_heard(ahead, pace, state.asked, heard, keep[state.id], yields=yields))
+        found.append(
+            drone_heard(ahead, pace, state.asked, min(heard, SILENT_AFTER), keep[state.id], yields=yields)
+        )
     for seen in company.missing:
         velocity, age = (ORIGIN, 0.0) if company.missed else (seen.velocity, seen.age)
         found.append(drone_silent(seen.position, velocity, age, keep[seen.id], lag))

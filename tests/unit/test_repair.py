@@ -9,9 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agents.agent import Agent
-from agents.company import SETTLING
+from agents.around import drones_around
+from agents.company import SETTLING, Memory, look_around
 from agents.control.modes import CRITICAL_BATTERY, HAND_LAND, LOW_BATTERY, POSE_LOST
 from agents.control.repair import BLEND, REFERENCE_LOST, RETURN_AFTER, Reference, kin_order
+from agents.control.safety.encounter import Clearance
 from agents.control.step import Output, Settings, State, step
 from agents.settings import agent_settings
 from agents.vehicles.base import Pose
@@ -20,6 +22,7 @@ from shared.codec import encode
 from shared.config import load_scenario
 from shared.formation import build_formation
 from shared.messages import Flag, Mode, Vector, Wish
+from shared.senses import Sensed
 from shared.topics import DRONE_STATE
 from shared.transport import Arrival
 from tests.unit.test_agent import state as drone_state
@@ -185,6 +188,17 @@ def silent_ages(seconds: list[float], *overrides: str) -> list[tuple[int, int]]:
         now = round((1.0 + age) * NS_PER_S)
         found.append(brain._inputs(now, pose, 0.0, brain._look_around(now)))
     return [(len(now.drones), sum(not each.yields for each in now.drones)) for now in found]
+
+
+def test_who_stands_on_the_ground_and_says_so_seldom_is_there_and_nowhere_else() -> None:
+    """Who waits steps ten times a second; who flies and is as silent may be at any height."""
+    for mode, above in ((Mode.GROUND, 1.0), (Mode.FOLLOW, math.inf)):
+        seen = Sensed(drone_state(2, seq=0, mode=mode), 0)
+        company = look_around(
+            1, {2: Memory(hovers=False, takeoff_height=1.2, landing_speed=0.5)}, {2: seen}, {}, NS_PER_S // 5
+        )
+        (met,) = drones_around(company, {2: Clearance(0.3, 1.0, 3.0)}, 0.0, NS_PER_S // 5)
+        assert met.above == above
 
 
 def test_a_silent_body_is_kept_away_from_until_it_must_be_down() -> None:
