@@ -51,7 +51,7 @@ class Voice:
             event = self._bridge.reported(report, now_ns)
             if event is not None:
                 self._pattern(encode(event))
-                _log.info("%s %s", event.pattern, event.outcome)
+                _log.info("%s %s%s", event.pattern, event.outcome, f": {report.why}" if report.why else "")
 
 
 def run(bridge: Bridge, glove: Glove, bus: Bus, inbox: Inbox, clock: Clock, stopping: threading.Event) -> None:

@@ -7,7 +7,7 @@ waited for it would feel nothing more.
 
 from attrs import Factory, define
 
-from glove_bridge.protocol import MIN_DEADMAN_MS, MOTORS, Hello, HelloReply
+from glove_bridge.protocol import MAX_FRAMES, MAX_PATTERN_MS, MIN_DEADMAN_MS, MOTORS, Hello, HelloReply
 
 CLOCK = 0.1
 """A device's clock may be off by this share: far more than any resonator is."""
@@ -66,6 +66,11 @@ def doubt_greeting(reply: HelloReply, hello: Hello) -> str:
     """Says why a device that answers a greeting cannot be used, empty if it can."""
     if reply.motors != MOTORS:
         return f"it says that it has {reply.motors} motors, a glove has {MOTORS}"
+    if reply.max_frames < MAX_FRAMES or reply.max_pattern_ms < MAX_PATTERN_MS:
+        return (
+            f"it takes patterns of up to {reply.max_frames} frames and {reply.max_pattern_ms} ms,"
+            f" ours have up to {MAX_FRAMES} and {MAX_PATTERN_MS}"
+        )
     if not MIN_DEADMAN_MS <= reply.deadman_ms <= hello.deadman_ms:
         return f"it grants a dead-man of {reply.deadman_ms} ms where {hello.deadman_ms} were asked for"
     return ""

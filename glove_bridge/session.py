@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from attrs import define
 
 from glove_bridge.framing import StreamDecoder, encode
-from glove_bridge.gloves.base import Outcome, Report
+from glove_bridge.gloves.base import CUT_SHORT, Outcome, Report
 from glove_bridge.link_timing import LinkTiming
 from glove_bridge.plausible import Playback, doubt_greeting
 from glove_bridge.protocol import (
@@ -53,10 +53,11 @@ _DELIVERED = (Status.OK, Status.DUPLICATE)
 
 @define
 class _Asked:
-    """A command on its way: how often it was sent, when first and last, and when to do so again."""
+    """A command on its way: how often it was sent, bytes that came since; when first, last, and when again."""
 
     command: Command
     sent: int = 0
+    heard: int = 0
     first_ns: int = 0
     sent_ns: int = 0
     due_ns: int = 0
@@ -112,30 +113,28 @@ class Session:
         self._asked = None
 
     def play(self, frames: Sequence[PlayFrame], now_ns: int) -> None:
-        """Plays a whole pattern; one that still plays fails, and this one if the device cannot."""
-        self._fail(now_ns)
-        length_ms = sum(frame.ms for frame in frames)
-        device = self.device
-        if device is None or len(frames) > device.max_frames or length_ms > device.max_pattern_ms:
-            self.refuse(now_ns)
+        """Plays a whole pattern; one that still plays fails, and this one if there is no device."""
+        self._fail(CUT_SHORT, now_ns)
+        if self.device is None:
+            self.refuse(self.fault, now_ns)
             return
-        self._playing, self._held = Playback(length_ms), False
+        self._playing, self._held = Playback(sum(frame.ms for frame in frames)), False
         self._ask(Play(self._next_seq(), tuple(frames), session=self._nonce), now_ns)
 
-    def refuse(self, now_ns: int) -> None:
+    def refuse(self, why: str, now_ns: int) -> None:
         """Reports a pattern as failed that is not even asked for."""
-        self._reports.append(Report(Outcome.FAILED, now_ns))
+        self._reports.append(Report(Outcome.FAILED, now_ns, why))
 
     def hold(self, duties: Sequence[int], now_ns: int) -> None:
         """Holds the motors at duties (0..255) until something else is asked for; what played fails."""
-        self._fail(now_ns)
+        self._fail(CUT_SHORT, now_ns)
         if self.device is not None:
             self._held = True
             self._ask(Set(self._next_seq(), tuple(duties), session=self._nonce), now_ns)
 
     def stop(self, now_ns: int) -> None:
         """Stops every motor; what played fails."""
-        self._fail(now_ns)
+        self._fail(CUT_SHORT, now_ns)
         if self.device is not None:
             self._held = False
             self._ask(Stop(self._next_seq(), session=self._nonce), now_ns)
@@ -143,6 +142,8 @@ class Session:
     def receive(self, data: bytes, now_ns: int) -> None:
         """Takes in what has arrived; no bytes raise."""
         self.babble += 0 if self._met else len(data)
+        if self._asked is not None:
+            self._asked.heard += len(data)
         for message in self._decoder.feed(data):
             if isinstance(message, HelloReply):
                 self._greeted(message, now_ns)
@@ -157,7 +158,7 @@ class Session:
         if asked is None or now_ns < asked.due_ns:
             return b""
         if asked.sent == ATTEMPTS and not isinstance(asked.command, Hello):
-            asked = self._greet(f"no answer to {ATTEMPTS} {_name(asked.command)}", now_ns)
+            asked = self._greet(_unanswered(asked), now_ns)
         return self._send(asked, now_ns) if now_ns >= asked.due_ns else b""
 
     def next_ns(self) -> int | None:
@@ -233,9 +234,10 @@ class Session:
         if ack.status in _DELIVERED:
             self._advance(asked, ack, now_ns)
         elif isinstance(asked.command, Play | Set):
+            self._fail(f"it refuses {_name(asked.command)}: {ack.status.name}", now_ns)
             self.stop(now_ns)  # or what was there before would go on
         else:
-            self._believe(f"it refuses {_name(asked.command)}", now_ns)
+            self._believe(f"it refuses {_name(asked.command)}: {ack.status.name}", now_ns)
 
     def _advance(self, asked: _Asked, ack: Ack, now_ns: int) -> None:
         """Reports start and end of what plays, as the device tells them; asks again when it should end."""
@@ -273,17 +275,22 @@ class Session:
         return self._asked
 
     def _end(self, why: str, now_ns: int) -> None:
-        self._fail(now_ns)
+        self._fail(why, now_ns)
         self.device, self.fault, self._held = None, why, False
 
-    def _fail(self, now_ns: int) -> None:
+    def _fail(self, why: str, now_ns: int) -> None:
         if self._playing is not None:
             self._playing = None
-            self._reports.append(Report(Outcome.FAILED, now_ns))
+            self._reports.append(Report(Outcome.FAILED, now_ns, why))
 
     def _next_seq(self) -> int:
         self._seq = (self._seq + 1) % _SEQS
         return self._seq
+
+
+def _unanswered(asked: _Asked) -> str:
+    said = "what it says is no answer to" if asked.heard else "no answer to"
+    return f"{said} {_name(asked.command)}, asked {asked.sent} times"
 
 
 def _name(command: Command) -> str:

@@ -15,10 +15,12 @@ class Played(NamedTuple):
     Attributes:
         outcome: `FINISHED` or `FAILED`.
         started_ms: From the wish to the first frame, ms; None if it did not start.
+        why: Of a failure.
     """
 
     outcome: Outcome
     started_ms: float | None
+    why: str = ""
 
 
 def play(glove: Glove, pattern: Pattern, clock: Clock) -> Played:
@@ -29,7 +31,7 @@ def play(glove: Glove, pattern: Pattern, clock: Clock) -> Played:
     while True:
         for report in glove.poll(clock()):
             if report.outcome is not Outcome.STARTED:
-                return Played(report.outcome, started_ms)
+                return Played(report.outcome, started_ms, report.why)
             started_ms = (report.at_ns - asked_ns) / 1e6
         next_ns = glove.next_ns()
         if next_ns is not None:
@@ -50,5 +52,6 @@ def play_set(glove: Glove, patterns: PatternSet) -> list[Played]:
 def tell(pattern: Pattern, played: Played) -> int:
     """Says how a pattern went, and returns the exit code for that."""
     begun = "never started" if played.started_ms is None else f"started after {played.started_ms:.1f} ms"
-    print(f"{pattern.name}: {begun}, {played.outcome}")
+    why = f": {played.why}; see docs/glove.md, first evening" if played.why else ""
+    print(f"{pattern.name}: {begun}, {played.outcome}{why}")
     return 0 if played.outcome is Outcome.FINISHED else 1

@@ -26,7 +26,7 @@ class AbsentGlove:
 
     def play(self, pattern: Pattern, now_ns: int) -> None:  # noqa: ARG002  interface
         """See `Glove.play`."""
-        self._reports.append(Report(Outcome.FAILED, now_ns))
+        self._reports.append(Report(Outcome.FAILED, now_ns, self.fault))
 
     def poll(self, now_ns: int) -> list[Report]:  # noqa: ARG002  interface
         """See `Glove.poll`."""

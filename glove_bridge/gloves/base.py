@@ -20,6 +20,8 @@ class Outcome(enum.StrEnum):
 
 
 LONGEST_WAIT_S = 3.0
+CUT_SHORT = "cut short by something newer"
+"""Why a pattern fails that was stopped, or for which another one was asked."""
 CLOSED = "closed"
 """The fault of a glove that was closed."""
 
@@ -30,10 +32,12 @@ class Report(NamedTuple):
     Attributes:
         outcome: `STARTED`, `FINISHED` or `FAILED`.
         at_ns: When, on the clock of the process.
+        why: Of a failure, for people.
     """
 
     outcome: Outcome
     at_ns: int
+    why: str = ""
 
 
 class GloveBackend(Protocol):

@@ -25,6 +25,8 @@ _LINKS = {"usb": USB, "xbee": XBEE}
 _POLL_NS = 2_000_000
 """How soon to poll again while the device has something to say."""
 
+HANGS = "its line hangs"
+
 FRESH_NS = 500_000_000
 """A pattern that the line's thread finds later than this is not played any more: it would be about the past."""
 OVERDUE_NS = 2 * NS_PER_S
@@ -73,7 +75,7 @@ class SerialGlove:
         """See `Glove.fault`."""
         if self._closed:
             return CLOSED
-        return "its line hangs" if self._given_up > self._ended else self.link.session.fault
+        return HANGS if self._given_up > self._ended else self.link.session.fault
 
     @property
     def rejected(self) -> Counter[str]:
@@ -84,7 +86,7 @@ class SerialGlove:
         """See `Glove.play`."""
         self._note(now_ns)
         if self._closed:
-            self._reports.append(Report(Outcome.FAILED, now_ns))
+            self._reports.append(Report(Outcome.FAILED, now_ns, CLOSED))
             return
         frames = device_frames(pattern, self._calibration)
         asked_ns = time.monotonic_ns()
@@ -93,7 +95,7 @@ class SerialGlove:
 
         def order(session: Session, at_ns: int) -> None:
             if at_ns - asked_ns > FRESH_NS:
-                session.refuse(at_ns)
+                session.refuse("the line was busy for too long", at_ns)
             else:
                 session.play(frames, at_ns)
 
@@ -104,10 +106,11 @@ class SerialGlove:
         offset = self._note(now_ns)
         for report in self.link.reports():
             if self._ended >= self._given_up:
-                self._reports.append(Report(report.outcome, report.at_ns + offset))
+                self._reports.append(report._replace(at_ns=report.at_ns + offset))
             self._ended += report.outcome is not Outcome.STARTED
         if self._waiting and now_ns > self._overdue_ns:
-            self._reports += [Report(Outcome.FAILED, now_ns)] * (self._asked - max(self._ended, self._given_up))
+            hung = Report(Outcome.FAILED, now_ns, HANGS)
+            self._reports += [hung] * (self._asked - max(self._ended, self._given_up))
             self._given_up = self._asked
             self.link.order(Session.stop)
         reports, self._reports = self._reports, []

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections import Counter
 
-from glove_bridge.gloves.base import Outcome, Report
+from glove_bridge.gloves.base import CUT_SHORT, Outcome, Report
 from glove_bridge.patterns.pattern import Frame, Pattern
 from shared.uri import Uri
 
@@ -42,7 +42,7 @@ class TimedGlove(ABC):
         """See `Glove.play`; the first frame is shown before it returns."""
         self._cut(now_ns)
         if not self.connected:
-            self._reports.append(Report(Outcome.FAILED, now_ns))
+            self._reports.append(Report(Outcome.FAILED, now_ns, self.fault))
             return
         self._pattern, self._started_ns, self._frame = pattern, now_ns, -1
         self._reports.append(Report(Outcome.STARTED, now_ns))
@@ -96,4 +96,4 @@ class TimedGlove(ABC):
     def _cut(self, now_ns: int) -> None:
         if self._pattern is not None:
             self._pattern = None
-            self._reports.append(Report(Outcome.FAILED, now_ns))
+            self._reports.append(Report(Outcome.FAILED, now_ns, self.fault or CUT_SHORT))

@@ -112,7 +112,7 @@ def test_a_pattern_starts_at_once_and_ends_when_it_should(worn: Worn) -> None:
     begun_ns = worn.play(EI)
     reports = worn.to_end()
     if not worn.glove.connected:
-        assert reports == [(Outcome.FAILED, START)]
+        assert reports == [Report(Outcome.FAILED, START, worn.glove.fault)]
     else:
         assert outcomes(reports) == ["started", "finished"]
         assert worn.time.agrees(reports[0].at_ns, begun_ns)

@@ -188,7 +188,7 @@ def test_without_a_device_everything_fails_at_once() -> None:
     session.play(PATTERN, 5)
     session.stop(6)
     session.hold(WEAK, 7)
-    assert session.take_reports() == [("failed", 5)]
+    assert session.take_reports() == [("failed", 5, "not open")]
     assert session.due(8) == b""
     assert session.next_ns() is None
 
@@ -222,7 +222,7 @@ def test_a_refused_pattern_fails_and_the_session_lives() -> None:
     session.play(PATTERN, 0)
     asked = said(session, 0)
     session.receive(encode(Ack(asked.seq, Status.BAD_BODY, 0, 0, session=asked.session)), MS)
-    assert session.take_reports() == [("failed", MS)]
+    assert session.take_reports() == [("failed", MS, "it refuses PLAY: BAD_BODY")]
     assert session.device is not None
     assert isinstance(said(session, MS), Stop), "what was there before does not go on"
 

@@ -85,7 +85,7 @@ def test_a_pattern_that_is_lost_is_told(glove: SimulatedGlove, capsys: pytest.Ca
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(buzz, "system_clock", begin_to_lose)
         assert main(["glove", "buzz", "1", "150", "50", "--glove", uri(glove)]) == 1
-    assert "finger 1: never started, failed" in capsys.readouterr().out
+    assert "finger 1: never started, failed: no answer to PLAY, asked 3 times; see" in capsys.readouterr().out
     assert glove.device.plays == []
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glove_bridge.framing import StreamDecoder, encode
-from glove_bridge.gloves.base import Report
+from glove_bridge.gloves.base import CUT_SHORT, Report
 from glove_bridge.link_timing import USB
 from glove_bridge.plausible import CLOCK, LATE_MS
 from glove_bridge.protocol import (
@@ -83,10 +83,12 @@ def bent(**lies: Any) -> Answer:
     [
         ({"remaining_ms": 60_000}, "something plays that nobody asked for"),
         ({"remaining_ms": HELD}, "something plays that nobody asked for"),
-        ({"status": Status.UNKNOWN_TYPE}, "it refuses PING"),
+        ({"status": Status.UNKNOWN_TYPE}, "it refuses PING: UNKNOWN_TYPE"),
         ({"status": Status.NO_SESSION}, "the device was reset"),
-        ({"session": 99}, f"no answer to {ATTEMPTS} PING"),
+        ({"session": 99}, "what it says is no answer to P"),
         ({"motors": 3}, "it says that it has 3 motors, a glove has 5"),
+        ({"max_frames": 0}, "it takes patterns of up to 0 frames and 10000 ms"),
+        ({"max_pattern_ms": 9_999}, "it takes patterns of up to 32 frames and 9999 ms"),
         ({"deadman_ms": 0}, "it grants a dead-man of 0 ms where 350 were asked for"),
         ({"deadman_ms": 60_000}, "it grants a dead-man of 60000 ms"),
     ],
@@ -96,6 +98,7 @@ def test_a_device_that_says_what_cannot_be_is_no_glove_and_says_why(lies: dict[s
     line.run(1_000)
     assert why in line.session.fault
     assert line.play() == ["failed"]
+    assert why in line.reports[-1].why
     assert why in line.session.fault
     assert line.lines < MOST_LINES_PER_S
 
@@ -132,6 +135,7 @@ def test_a_pattern_ends_in_time_and_the_glove_is_unusable_until_one_is_played_we
     line.run(50)
     assert line.session.fault == ""
     assert line.play() == outcomes
+    assert why in line.reports[-1].why
     line.run(500)
     assert line.session.device is not None, "greeted anew"
     assert why in line.session.fault
@@ -230,9 +234,36 @@ def test_another_version_is_named_whatever_nonce_it_answers_with() -> None:
     assert f"speaks protocol {PROTOCOL - 1}, not {PROTOCOL}; flash it" in line.session.fault
 
 
-def test_a_pattern_that_the_device_cannot_hold_fails_at_once() -> None:
-    for lies in ({"max_frames": 1}, {"max_pattern_ms": 299}):
-        line = Line(bent(**lies))
-        line.run(100)
-        assert line.play() == ["failed"]
-        assert line.session.fault == ""
+def refusing(status: Status) -> Answer:
+    """A device that works, and plays nothing."""
+    device = Device()
+
+    def answer(command: Command, now_ns: int) -> bytes:
+        reply = device.answer(command, now_ns)
+        return encode(
+            attrs.evolve(reply, status=status)
+            if isinstance(reply, Ack) and isinstance(command, Play)
+            else reply
+        )
+
+    return answer
+
+
+def test_why_a_pattern_has_failed_is_reported() -> None:
+    line = Line(refusing(Status.BAD_BODY))
+    line.run(100)
+    assert line.play() == ["failed"]
+    assert line.reports[-1].why == "it refuses PLAY: BAD_BODY"
+
+    silent = bent()
+    line = Line(lambda command, now_ns: b"" if isinstance(command, Play) else silent(command, now_ns))
+    line.run(100)
+    assert line.play() == ["failed"]
+    assert line.reports[-1].why == f"no answer to PLAY, asked {ATTEMPTS} times"
+
+    line = Line(bent())
+    line.run(100)
+    line.session.play(PATTERN, line.now_ns)
+    line.run(20)
+    assert line.play() == ["failed", "started", "finished"]
+    assert [report.why for report in line.reports] == [CUT_SHORT, "", ""]
