@@ -1,4 +1,4 @@
-"""The web application: the page's files, its WebSocket, and who is let in."""
+"""The web application: the page's files, its WebSocket, STOP for those without one, and who is let in."""
 
 import asyncio
 import contextlib
@@ -11,9 +11,9 @@ from urllib.parse import parse_qs
 from starlette.applications import Starlette
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.middleware import Middleware
-from starlette.requests import cookie_parser
-from starlette.responses import PlainTextResponse, RedirectResponse
-from starlette.routing import Mount, WebSocketRoute
+from starlette.requests import Request, cookie_parser
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -28,7 +28,7 @@ LOOK_S = 0.5
 """How often to look whether a page that has a kept place steers."""
 
 _TRY_AGAIN_LATER = 1013
-_FULL = "so many pages are open that only one that steers finds room"
+_FULL = "so many pages are open that only one that steers finds room; STOP is heard all the same"
 _STRANGER = (
     "this console was started without a token, for one user of this machine: others come in by a token"
     " (--token random)\n"
@@ -64,8 +64,16 @@ def make_app(console: Console, token: str | None, guests: Guests = lambda _: Non
         with _seated(places, guest) as place:
             await _serve_page(websocket, console, place)
 
+    async def stop(_: Request) -> Response:
+        unheard = console.stop()
+        return PlainTextResponse(unheard, 503) if unheard else Response(status_code=204)
+
     return Starlette(
-        routes=[WebSocketRoute("/ws", page), Mount("/", StaticFiles(directory=PAGE, html=True))],
+        routes=[
+            WebSocketRoute("/ws", page),
+            Route("/stop", stop, methods=["POST"]),
+            Mount("/", StaticFiles(directory=PAGE, html=True)),
+        ],
         middleware=[Middleware(Guard, token=token, guests=guests)],
     )
 
@@ -171,7 +179,8 @@ class Guard:
             return _STRANGER
         if not is_own_host(host, self._names):
             return f"{host!r:.80} is no name of this machine; open the console by its address or as localhost\n"
-        if scope["type"] == "websocket" and not is_same_site(headers.get("origin"), host):
+        acts = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
+        if acts and not is_same_site(headers.get("origin"), host):
             return "the console talks to its own page only\n"
         if self._token is not None and not (
             is_token(_cookie(headers, _cookie_name(scope)), self._token)

@@ -29,6 +29,8 @@ from shared.scenario import Scenario
 from shared.transport import Arrival, Bus, Inbox
 
 ROLE = "console"
+NOBODY = 0
+"""Pages are numbered from 1."""
 RATE_HZ = 60.0
 """Most snapshots per second."""
 
@@ -124,6 +126,17 @@ class Console:
             link.tell(encode({"type": "refused", "why": str(error)}))
             return
         self._send_hand(now)
+
+    def stop(self) -> str:
+        """Stops all motors, for whoever has no page; as final as a page's STOP.
+
+        Returns:
+            Why nobody has heard it, empty if the relay has; it is repeated either way.
+        """
+        now = self._clock()
+        self._own(want(self._owner, NOBODY, Wish.STOP, now / NS_PER_S))
+        self._send_hand(now)
+        return self._unheard
 
     def step(self, arrivals: Mapping[str, Sequence[Arrival]]) -> None:
         """Takes what has arrived from the swarm, tells the pages, and repeats the hand."""

@@ -165,6 +165,7 @@ async def _open_to_pages(
     if peers and not peers.works:
         print(f"console | all users of this machine may come in: {_TOKEN_HINT}", flush=True)
     door = Door(listener, peers)
+    logging.getLogger("asyncio").addFilter(is_news)
     config = _config(make_app(console, token, door.guest), pair)
     config.load()
     server = uvicorn.Server(config)
@@ -202,6 +203,11 @@ def _config(app: ASGIApp, pair: tuple[Path, Path] | None) -> uvicorn.Config:
         timeout_graceful_shutdown=1,
         **tls,
     )
+
+
+def is_news(record: logging.LogRecord) -> bool:
+    """Says whether a line of asyncio's log is worth one: it has one for each write to a page that has gone."""
+    return record.msg != "socket.send() raised exception."
 
 
 @contextlib.contextmanager

@@ -231,6 +231,17 @@ def test_two_pages_contend() -> None:
     assert newest(one)["control"]["wish"] == "STOP"
 
 
+def test_stop_needs_no_page_and_says_whether_it_was_heard() -> None:
+    stage = Stage()
+    stage.deaf = "nobody listens at pointer.sock"
+    assert stage.console.stop() == stage.deaf
+    stage.deaf = ""
+    stage.step(0.1)
+    assert stage.last().verb is Verb.STOP, "it is repeated, also without any page"
+    assert stage.console.stop() == ""
+    assert newest(stage.console.open())["control"]["wish"] == "STOP"
+
+
 def test_garbage_from_a_page_is_answered() -> None:
     stage = Stage()
     link = stage.console.open()

@@ -38,13 +38,13 @@ HERE = "http://127.0.0.1:8460"
 WS = "ws://127.0.0.1:8460/ws"
 
 
-def console() -> Console:
+def console(unheard: str = "") -> Console:
     scenario = load_scenario("slalom")
     formation = build_formation(scenario)
     hand = HandMap(scenario, formation)
     view = SwarmView(formation, hand, {}, frozenset(), 0)
     return Console(
-        scenario, formation, view=view, hand=hand, point=lambda _: "", sender=1, clock=system_clock()
+        scenario, formation, view=view, hand=hand, point=lambda _: unheard, sender=1, clock=system_clock()
     )
 
 
@@ -116,6 +116,21 @@ def test_foreign_names_and_sites_are_refused_whatever_they_know(token: str | Non
             pass
 
 
+def test_stop_is_obeyed_from_this_very_site_and_from_whoever_is_let_in() -> None:
+    with TestClient(make_app(console(), TOKEN), base_url=HERE) as client:
+        assert client.post("/stop").status_code == 403
+        client.get(f"/?token={TOKEN}")
+        assert client.post("/stop", headers={"origin": "http://evil.example"}).status_code == 403
+        assert client.get("/stop").status_code == 404
+        assert client.post("/stop", headers={"origin": HERE}).status_code == 204
+
+
+def test_a_stop_that_nobody_hears_is_no_success() -> None:
+    with TestClient(make_app(console("nobody listens"), None), base_url=HERE) as client:
+        answer = client.post("/stop")
+        assert (answer.status_code, answer.text) == (503, "nobody listens")
+
+
 def test_without_a_token_this_machine_is_let_in() -> None:
     with TestClient(make_app(console(), None), base_url=HERE) as client:
         answer = client.get("/")
@@ -166,6 +181,7 @@ def test_when_all_places_are_taken_only_who_steers_finds_room(monkeypatch: pytes
         other = pages.enter_context(client.websocket_connect(WS))
         other.send_json({"type": "take"})
         assert "only one that steers" in closing_reason(client), "both kept places are taken"
+        assert client.post("/stop").status_code == 204, "STOP needs no place"
         until(lambda: served.pages == PAGES_OF_ONE + KEPT)
         time.sleep(2.0)
         assert served.pages == PAGES_OF_ONE + KEPT, "one holds the hand, the other asks for it"

@@ -1,5 +1,9 @@
 """Who has to go when too many are at the console's door, and which pages get a place."""
 
+import asyncio
+import logging
+import socket
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,6 +26,7 @@ from observer.console.crowd import (
     in_the_way,
     origin,
 )
+from observer.console.serve import is_news
 
 
 @pytest.mark.parametrize(
@@ -116,6 +121,25 @@ def test_places_end_for_one_place_and_for_all_and_two_are_kept() -> None:
     assert places.take("operator") == Place("operator"), "a place that is free is better than a kept one"
     places.leave(Place("operator", is_kept=True))
     assert places.take("one") == Place("one", is_kept=True)
+
+
+def test_pages_that_go_away_fill_no_log(caplog: pytest.LogCaptureFixture) -> None:
+    async def write_to_who_has_gone() -> None:
+        _, server = await asyncio.open_connection(sock=ours)
+        server.transport.abort()
+        for _ in range(100):
+            server.transport.write(b"x")
+
+    logger = logging.getLogger("asyncio")
+    logger.addFilter(is_news)
+    try:
+        ours, theirs = socket.socketpair()
+        with ours, theirs:
+            asyncio.run(write_to_who_has_gone())
+        logger.warning("something else")
+    finally:
+        logger.removeFilter(is_news)
+    assert [record.message for record in caplog.records] == ["something else"]
 
 
 def test_a_page_may_speak_in_every_frame_and_no_faster() -> None:

@@ -46,6 +46,16 @@ export class Connection {
     }
   }
 
+  /** Stops all motors by every way there is: a page for which there was no place, or whose connection hangs, can.
+   * @returns {Promise<string>} why it was not heard, empty if it was */
+  async stop() {
+    this.send({ type: "wish", wish: "STOP" });
+    return fetch("stop", { method: "POST" }).then(
+      async (answer) => (answer.ok ? "" : await answer.text()),
+      () => "the console does not answer",
+    );
+  }
+
   /** A refused WebSocket does not say why; a plain request does: a console that was started again may have a new
    * token. @returns {Promise<boolean>} */
   async #refused() {

@@ -32,7 +32,7 @@ const calm = matchMedia("(prefers-reduced-motion: reduce)");
 let bare = false;
 
 const connection = new Connection({ message: receive, state: connectionChanged, refused });
-const control = new ControlPanel(model, (message) => connection.send(message));
+const control = new ControlPanel(model, (message) => connection.send(message), stop);
 const keys = new Keys({ take: () => control.reach(), stop: () => control.order("STOP") });
 const gamepads = new Gamepads((wish) => control.order(wish));
 const tilt = new Tilt();
@@ -98,6 +98,14 @@ function disobeyed(why) {
   if (model.mine) {
     write(part("hand-state"), why);
     setTimeout(() => control.show(connection.open), REFUSAL_MS);
+  }
+}
+
+/** STOP counts from every page, also from one that has no connection: such a page is told here what has become of it. */
+async function stop() {
+  const why = await connection.stop();
+  if (why || !connection.open) {
+    showNotices([{ level: "alarm", text: why ? `STOP was not heard: ${why}` : "STOP: motors off" }]);
   }
 }
 

@@ -16,13 +16,15 @@ const ADVICE = {
 export class ControlPanel {
   #model;
   #send;
+  #stop;
   /** Who has been told no: that page must ask anew to be shown again. @type {number | undefined} */
   #refused;
 
-  /** @param {Model} model @param {(message: object) => void} send */
-  constructor(model, send) {
+  /** @param {Model} model @param {(message: object) => void} send @param {() => void} stop stops all motors */
+  constructor(model, send, stop) {
     this.#model = model;
     this.#send = send;
+    this.#stop = stop;
     onPress(part("take"), () => send({ type: this.#releases ? "release" : "take" }));
     onPress(part("give"), () => send({ type: "give", to: model.asking[0] }));
     onPress(part("keep"), () => this.#keep());
@@ -38,7 +40,9 @@ export class ControlPanel {
 
   /** Says what the operator wants, and takes the hand for it if it is free. @param {string} wish */
   order(wish) {
-    if (wish === "STOP" || this.reach()) {
+    if (wish === "STOP") {
+      this.#stop();
+    } else if (this.reach()) {
       this.#send({ type: "wish", wish });
     }
   }
@@ -74,7 +78,7 @@ export class ControlPanel {
     part("asked").hidden = !mine || asking.length === 0 || asking[0] === this.#refused;
     for (const one of orderButtons()) {
       const stop = one.dataset.order === "STOP";
-      one.disabled = !steers || !(mine || holder === null || stop);
+      one.disabled = stop ? scene?.can_steer === false : !steers || !(mine || holder === null);
       one.setAttribute("aria-current", String(mine && one.dataset.order === this.#model.wish));
     }
   }
