@@ -7,6 +7,10 @@ from shared.messages import PatternEvent
 from shared.plain_text import plain
 from shared.topics import DRONE_STATE
 
+LONGEST_NAME, MOST_NAMES = 24, 64
+"""Names of patterns are shorter and fewer; anybody may say others."""
+OTHERS = "others"
+
 _DRONE = DRONE_STATE.pattern.split("{", maxsplit=1)[0]
 
 
@@ -32,6 +36,7 @@ class GloveLog:
         self.failed: Counter[str] = Counter()
         self.lost: Counter[str] = Counter()
         self.latency_ms = Histogram()
+        self._names: set[str] = set()
 
     def add(self, event: PatternEvent) -> None:
         """Takes the next event."""
@@ -41,7 +46,7 @@ class GloveLog:
             "suppressed": self.suppressed,
             "failed": self.failed,
         }
-        name = plain(event.pattern)
+        name = self._named(event.pattern)
         if event.outcome in counts:
             counts[event.outcome][name] += 1
         if event.outcome == "started":
@@ -50,6 +55,13 @@ class GloveLog:
             self.lost[name] += 1
         if event.outcome != "suppressed":
             self.latest = event
+
+    def _named(self, pattern: str) -> str:
+        name = plain(pattern, LONGEST_NAME)
+        if name not in self._names and len(self._names) >= MOST_NAMES:
+            return OTHERS
+        self._names.add(name)
+        return name
 
     def _add_latency(self, event: PatternEvent) -> None:
         """Arrival and first frame are both on the bridge's clock."""

@@ -4,6 +4,7 @@ Order matters: of two nodes that need each other the later one in `all_nodes` di
 """
 
 import math
+from collections.abc import Collection
 
 from shared.formation import Formation
 from shared.scenario import Net, Scenario
@@ -17,6 +18,9 @@ CONSOLE = "console"
 
 LOOPBACK = "127.0.0.1"
 
+MOST_OTHERS = 32
+"""Processes that are listened to beyond those that a swarm has."""
+
 NEAR = 1.5
 """Drones that rest within this distance link to each other, m."""
 
@@ -29,6 +33,23 @@ def drone_node(drone: int) -> str:
 def all_nodes(formation: Formation) -> tuple[str, ...]:
     """Returns every node of the swarm in dialling order."""
     return (RELAY, *(drone_node(i) for i in formation.ids), WORLD, BRIDGE, OBSERVER)
+
+
+def processes(formation: Formation) -> frozenset[str]:
+    """Returns the processes that a swarm may have, as `role/number`."""
+    single = (f"{role}/0" for role in (RELAY, WORLD, BRIDGE, OBSERVER, CONSOLE))
+    return frozenset((*single, *map(drone_node, formation.ids)))
+
+
+def admits(expected: Collection[str], known: Collection[str], token: str) -> bool:
+    """Says whether to remember a process: anybody may make up many, and each would stay for ever.
+
+    Args:
+        expected: Those that the swarm may have, who always are.
+        known: Those that are remembered.
+        token: Who it is, as `role/number`.
+    """
+    return token in expected or token in known or len(known) < len(expected) + MOST_OTHERS
 
 
 def endpoint(scenario: Scenario, formation: Formation, node: str) -> str:

@@ -15,7 +15,13 @@ def plain(text: object, longest: int = LONGEST) -> str:
         longest: How much is shown, characters.
     """
     said = str(text)
-    cut = f"{said[:longest]}..." if len(said) > longest else said
-    if cut.isprintable():
-        return cut
-    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in cut)
+    if len(said) <= longest and said.isprintable():
+        return said
+    room, shown = longest, list[str]()
+    for one in said[: longest + 1]:
+        piece = one if one.isprintable() else one.encode("unicode_escape").decode()
+        room -= len(piece)
+        if room < 0:
+            return f"{''.join(shown)}..."
+        shown.append(piece)
+    return "".join(shown)

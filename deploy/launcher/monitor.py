@@ -10,10 +10,10 @@ from shared.codec import decode_on
 from shared.errors import DecodeError
 from shared.formation import Formation
 from shared.messages import DroneState, HandSample, Heard, Message, Mode, PatternEvent, ProcessStatus, Wish
-from shared.nodes import RELAY
+from shared.nodes import RELAY, admits, processes
 from shared.order import check_newer
 from shared.topics import DRONE_STATE, HAND, PATTERN, STATUS, topic_of
-from shared.transport import MOST_KEYS, TOO_MANY, Bus, Inbox
+from shared.transport import TOO_MANY, Bus, Inbox
 
 INBOX_DEPTH = 4096
 """Samples kept per key between two drains: a minute of them, so that the statistics miss none."""
@@ -39,7 +39,7 @@ class Monitor:
         self.health: dict[str, Health] = {}
         self.rejected: Counter[str] = Counter()
         self.asked = False
-        self._ids = formation.ids
+        self._ids, self._expected = formation.ids, processes(formation)
         self._newest: dict[str, Heard] = {}
         self._inbox = Inbox(clock, INBOX_DEPTH)
         for topic in (HAND, DRONE_STATE, PATTERN, STATUS):
@@ -117,14 +117,14 @@ class Monitor:
             self._newest[key] = sample
 
     def _add_status(self, token: str, status: ProcessStatus) -> None:
-        if token not in self.health and len(self.health) >= MOST_KEYS:
+        if not admits(self._expected, self.health, token):
             self.rejected[TOO_MANY] += 1
             return
         self.health.setdefault(token, Health()).add(status)
 
     def _presence_changed(self, token: str, present: bool) -> None:
         """Called by the bus, on its thread: single set operations only."""
-        if present:
+        if present and admits(self._expected, self.present, token):
             self.present.add(token)
         else:
             self.present.discard(token)

@@ -11,6 +11,7 @@ from shared.net.audit import LINKED, REFUSED
 from shared.nodes import DRONE, RELAY, WORLD
 from shared.plain_text import plain
 
+_LONGEST_STATE = 40
 WELL_STATES = ("running", "starting")
 WORRYING = (
     Flag.BLOCKED
@@ -101,7 +102,7 @@ def judge(token: str, heard: Heard) -> Row:
     if heard.status is None:
         problems.append("says nothing")
     elif heard.status.state not in WELL_STATES:
-        problems.append(plain(heard.status.state))
+        problems.append(plain(heard.status.state, _LONGEST_STATE))
     if heard.status is not None and heard.status.metrics.get(GLOVE_THERE) == 0.0:
         problems.append("no glove that can be felt")
     if token.startswith(f"{DRONE}/") and heard.state is None:

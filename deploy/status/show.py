@@ -6,7 +6,9 @@ from rich import box
 from rich.table import Table
 
 from deploy.status.report import Row
+from shared.plain_text import plain
 
+_LONGEST_FORM = 16
 _LEFT = ("process", "mode", "law", "how it is")
 
 
@@ -64,7 +66,7 @@ def _cells(row: Row) -> tuple[str, ...]:
         f"{status.rate_hz:.0f} Hz" if status else "-",
         f"{status.cpu:.0%}" if status else "-",
         f"{status.rss_mb:.0f} MB" if status else "-",
-        status.form.removeprefix("compiled ") if status else "-",
+        plain(status.form.removeprefix("compiled "), _LONGEST_FORM) if status else "-",
         str(sum(status.rejected.values())) if status else "-",
         ", ".join(row.problems) or "well",
     )

@@ -9,11 +9,11 @@ _AIRBORNE = frozenset({Mode.TAKEOFF, Mode.FOLLOW, Mode.HOLD, Mode.LAND})
 _FLAGS = (
     (Flag.CRITICAL_BATTERY, "alarm", "battery critical"),
     (Flag.FENCE, "warning", "at the fence"),
-    (Flag.BLOCKED, "warning", "blocked: does not reach its goal"),
+    (Flag.BLOCKED, "warning", "blocked: goal not reached"),
     (Flag.LOW_BATTERY, "warning", "battery low"),
-    (Flag.OLD_POSE, "warning", "does not know where it is: its pose is old"),
-    (Flag.MISSED, "alarm", "is not heard by others, or does not hear them: it holds, then lands"),
-    (Flag.REJECTED_INPUT, "warning", "does not believe what it hears: who says so is in its log"),
+    (Flag.OLD_POSE, "warning", "without a fresh pose: place unknown"),
+    (Flag.MISSED, "alarm", "cut off from others: holding, then landing"),
+    (Flag.REJECTED_INPUT, "warning", "doubtful of what is heard: who says so is in the log"),
 )
 
 

@@ -25,12 +25,12 @@ from shared.messages import (
     ProcessStatus,
     Vector,
 )
-from shared.nodes import WORLD
+from shared.nodes import WORLD, admits, processes
 from shared.obstacle_watch import ObstacleWatch
 from shared.plain_text import plain
 from shared.senses import Sensed, Senses
 from shared.topics import DRONE_STATE, FORMATION_STATE, HAND, OBSTACLE, PATTERN, STATUS
-from shared.transport import MOST_KEYS, TOO_MANY, Arrival
+from shared.transport import TOO_MANY, Arrival
 
 Frames = Mapping[str, Sequence[Json]]
 """Pattern name -> frames `{ms, hz: {finger: Hz}}`."""
@@ -60,7 +60,7 @@ class SwarmView:
     ) -> None:
         self.present: set[str] = set()
         self.rejected: Counter[str] = Counter()
-        self._senses = Senses(formation.ids)
+        self._senses, self._expected = Senses(formation.ids), processes(formation)
         self._sensed = frozenset(self._senses.keys)
         self._hand, self._patterns, self._cues, self._start_ns = hand, patterns, cues, start_ns
         self._formation: Sensed[FormationState] | None = None
@@ -118,7 +118,7 @@ class SwarmView:
 
     def presence_changed(self, token: str, present: bool) -> None:
         """Takes in that a process came or left; called on the bus's thread: single set operations only."""
-        if present and token != MYSELF:
+        if present and token != MYSELF and admits(self._expected, self.present, token):
             self.present.add(token)
         else:
             self.present.discard(token)
@@ -167,7 +167,7 @@ class SwarmView:
 
     def _add_status(self, sensed: Sensed[ProcessStatus]) -> None:
         token = f"{sensed.message.role}/{sensed.message.id}"
-        if token not in self._statuses and len(self._statuses) >= MOST_KEYS:
+        if not admits(self._expected, self._statuses, token):
             self.rejected[TOO_MANY] += 1
             return
         self._statuses[token] = sensed

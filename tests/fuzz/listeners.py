@@ -8,6 +8,7 @@ from typing import Any
 
 from deploy.launcher.flight import Outcome
 from deploy.launcher.monitor import Monitor
+from deploy.launcher.process_table import GloveChoice
 from deploy.launcher.status_view import AgentRow, status_table
 from deploy.launcher.summary import flight_summary, print_summary
 from deploy.status.report import Heard, rows_of
@@ -128,7 +129,7 @@ def _show(monitor: Monitor, links: SwarmLinks) -> None:
     }
     rows = rows_of((), heard)
     agents = [AgentRow(id=i, state=state) for i, state in monitor.stats.latest.items()]
-    summary = flight_summary(_OUTCOME, monitor)
+    summary = flight_summary(_OUTCOME, monitor, GloveChoice(uri="screen://", patterns="flight"))
     for shown in (
         status_table(agents, "flight"),
         process_table(rows, "status"),

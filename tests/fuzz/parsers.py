@@ -46,7 +46,7 @@ from shared.net.audit import Audit
 from shared.net.keyring import Keyring
 from shared.net.settings import node_settings
 from shared.nodes import all_nodes, drone_node
-from shared.plain_text import plain
+from shared.plain_text import LONGEST, plain
 from shared.pointer_link import decode_pointed
 from shared.radio_link import decode_datagram, encode_head, radio_group
 from shared.recordings.flight_folder import read_meta, read_obstacles, read_patterns, read_track
@@ -258,6 +258,7 @@ def _text(data: bytes) -> object:
     text = data.decode("utf-8", "surrogateescape")
     shown = plain(text)
     assert shown.isprintable(), shown
+    assert len(shown) <= LONGEST + 3, shown
     assert not text.isprintable() or text.startswith(shown.removesuffix("..."))
     out = StringIO()
     table = Table(title=text, caption=text)

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 from collections import Counter
 from typing import Any
 
@@ -31,10 +32,11 @@ from shared.messages import (
     Vector,
     Wish,
 )
+from shared.nodes import MOST_OTHERS, processes
 from shared.pointer_link import Pointed, Verb, decode_pointed
 from shared.scenario import Scenario
 from shared.topics import DRONE_STATE, HAND, PATTERN, STATUS
-from shared.transport import Arrival
+from shared.transport import TOO_MANY, Arrival
 
 START = 1_000 * NS_PER_S
 RHOMBUS = load_scenario("slalom")
@@ -257,15 +259,45 @@ def test_garbage_from_the_swarm_is_counted() -> None:
     assert sum(stage.console.view.rejected.values()) == 2
 
 
+def test_what_several_drones_suffer_reads_as_well_as_what_one_does() -> None:
+    stage = Stage()
+    every = Flag.OLD_POSE | Flag.MISSED | Flag.REJECTED_INPUT | Flag.BLOCKED
+    told = [
+        [
+            notice["text"]
+            for notice in notices(dict.fromkeys(ids, stage.drone(flags=every)), (), hand_silent=False)
+        ]
+        for ids in ([1], [1, 2])
+    ]
+    assert [text.replace("drone 1", "drones 1, 2") for text in told[0]] == told[1]
+    assert not any(re.search(r"^drones 1, 2 (is|does|has)\b|\b(it|its)\b", text) for text in told[1])
+
+
+def test_made_up_processes_fill_neither_the_page_nor_the_memory() -> None:
+    stage = Stage()
+    link = stage.console.open()
+    for number in range(1_000):
+        made_up = ProcessStatus(**stage.envelope(), role="evil", id=number, pid=1, host="h", state="running")
+        key = STATUS.key(role="evil", id=number)
+        stage.console.step({key: [Arrival(encode(made_up), stage.now)]})
+        stage.console.view.presence_changed(f"evil/{number}", present=True)
+    relay = ProcessStatus(**stage.envelope(), role="relay", id=0, pid=1, host="h", state="running")
+    stage.console.view.presence_changed("drone/4", present=True)
+    stage.step(1.1, relay=relay)
+    listed = {process["name"]: process for process in newest(link)["health"]["processes"]}
+    assert listed["relay"]["age"] is not None
+    assert listed["drone-4"]["present"]
+    assert len(listed) <= 2 + len(processes(build_formation(RHOMBUS))) + MOST_OTHERS
+    assert stage.console.view.rejected[TOO_MANY] > 900
+
+
 def test_notices_and_health_come_when_something_changes() -> None:
     stage = Stage()
     link = stage.console.open()
     status = ProcessStatus(**stage.envelope(), role="relay", id=0, pid=1, host="h", state="running", cpu=0.05)
     stage.step(0.2, drone_1=stage.drone(flags=Flag.BLOCKED), relay=status)
     told = newest(link)
-    assert told["notices"]["notices"] == [
-        {"level": "warning", "text": "drone 1 blocked: does not reach its goal"}
-    ]
+    assert told["notices"]["notices"] == [{"level": "warning", "text": "drone 1 blocked: goal not reached"}]
     stage.step(1.0)
     told = newest(link)
     assert told["notices"]["notices"][0] == {"level": "alarm", "text": "drone 1 is lost"}

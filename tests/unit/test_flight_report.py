@@ -12,21 +12,35 @@ from rich.console import Console
 
 from deploy.launcher.flight import GRACE_S, INTERRUPTED_LANDING_S, Outcome
 from deploy.launcher.monitor import Monitor
+from deploy.launcher.process_table import GloveChoice
 from deploy.launcher.status_view import SUMMARISE_ABOVE, AgentRow, plain_lines, status_table
 from deploy.launcher.summary import Json, flight_summary, print_summary
 from deploy.terminal.console import open_console
 from human_relay.relay import IMPOSSIBLE_POSE
+from observer.glove_log import MOST_NAMES, OTHERS
 from shared.clock import system_clock
 from shared.codec import encode
 from shared.config import load_scenario
 from shared.formation import build_formation
 from shared.memory_bus import MemoryBus, MemoryNetwork
-from shared.messages import ORIGIN, DroneState, Flag, HandSample, Heard, Mode, ProcessStatus, Wish
+from shared.messages import (
+    ORIGIN,
+    DroneState,
+    Flag,
+    HandSample,
+    Heard,
+    Mode,
+    PatternEvent,
+    ProcessStatus,
+    Wish,
+)
+from shared.nodes import MOST_OTHERS, processes
 from shared.topics import DRONE_STATE, HAND, STATUS
-from shared.transport import MOST_KEYS, TOO_MANY
+from shared.transport import TOO_MANY
 
 FORMATION = build_formation(load_scenario("rhombus"))
 NO_FLAGS = Flag(0)
+NASTY = "\x1b]0;mine\x07[/x][bold]\u202e"
 REFEREE = {"collisions": 0.0, "fence_exits": 0.0, "min_distance_m": 0.5, "min_hand_distance_m": 0.4}
 
 
@@ -113,7 +127,7 @@ def rendered(renderable: object, width: int = 80) -> str:
 
 
 def printed(summary: Json) -> str:
-    console = Console(file=io.StringIO(), width=80)
+    console = Console(file=io.StringIO(), width=80, markup=False)
     print_summary(summary, console)
     return cast(io.StringIO, console.file).getvalue()
 
@@ -206,18 +220,35 @@ def test_whatever_key_is_put_the_monitor_goes_on() -> None:
 
 def test_made_up_processes_do_not_fill_the_memory() -> None:
     swarm = Swarm()
-    for number in range(2 * MOST_KEYS):
+    for number in range(2_000):
         made_up = replace(status(1), role="observer", id=number)
         swarm.bus.publisher(STATUS, role="observer", id=number)(encode(made_up))
-        if number % 1000 == 0:
-            swarm.monitor.drain()
+        swarm.monitor._presence_changed(f"observer/{number}", present=True)
     swarm.monitor.drain()
-    assert len(swarm.monitor.health) == MOST_KEYS
-    assert swarm.monitor.rejected[TOO_MANY] > 1000
-    swarm.say(replace(status(1), role="observer", id=0, cpu=0.75))
-    newest = swarm.monitor.health["observer/0"].status
+    most = len(processes(FORMATION)) + MOST_OTHERS
+    assert len(swarm.monitor.health) == len(swarm.monitor.present) == most
+    assert swarm.monitor.rejected[TOO_MANY] == 2_000 - most
+    swarm.bus.announce("drone", 4)
+    assert "drone/4" in swarm.monitor.present
+    newest = swarm.say(replace(status(1), cpu=0.75)).health["drone/1"].status
     assert newest is not None
     assert newest.cpu == 0.75
+
+
+def test_made_up_patterns_fill_neither_the_summary_nor_the_memory() -> None:
+    swarm = Swarm()
+    for number in range(1_000):
+        swarm.monitor.glove.add(
+            PatternEvent(
+                epoch=1, seq=number, stamp_ns=0, pattern=f"{number}{NASTY * 10}", outcome="started", state_seq=0
+            )
+        )
+    summary = flight_summary(outcome(), swarm.monitor, GloveChoice(uri="screen://", patterns="paper"))
+    assert len(summary["glove"]["delivered"]) == MOST_NAMES + 1
+    assert summary["glove"]["delivered"][OTHERS] == 1_000 - MOST_NAMES
+    text = printed(summary)
+    assert all(word in text for word in ("played", "delivered", "suppressed", "failed", "lost"))
+    assert max(map(len, text.splitlines())) <= 80
 
 
 def test_nobody_speaks_for_another() -> None:

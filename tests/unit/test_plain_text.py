@@ -33,6 +33,8 @@ def test_what_is_harmless_is_shown_as_it_is(text: str) -> None:
 def test_escapes_are_seen_and_length_is_cut() -> None:
     assert plain("a\x1b[31m\n\u202e") == r"a\x1b[31m\n\u202e"
     assert plain("x" * 500) == "x" * LONGEST + "..."
+    assert plain("\x1b" * 10, 9) == r"\x1b\x1b...", "cut as it is shown"
+    assert plain("123456789", 9) == "123456789"
 
 
 def test_to_a_console_every_string_is_text() -> None:

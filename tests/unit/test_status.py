@@ -63,6 +63,17 @@ def test_a_drone_is_judged_by_presence_health_and_flags(heard: Heard, problems: 
     assert row.well is not bool(problems)
 
 
+def test_what_others_say_of_themselves_leaves_the_table_its_columns() -> None:
+    said = "\x1b[31m[/x]" * 20
+    row = judge("drone/1", Heard(present=True, status=replace(status(said), form=said), state=drone()))
+    out = StringIO()
+    Console(file=out, width=100, markup=False).print(status_table([row], "swarm x"))
+    told = out.getvalue()
+    assert "\x1b" not in told
+    assert re.search(r"drone/1 +FOLLOW +1.20 m +60 Hz", told)
+    assert len([line for line in told.splitlines() if line.strip()]) <= 6
+
+
 def test_a_bridge_without_a_glove_says_so() -> None:
     for there, problems in ((1.0, ()), (0.0, ("no glove that can be felt",))):
         health = msgspec.structs.replace(status(), role="bridge", id=0, metrics={GLOVE_THERE: there})
