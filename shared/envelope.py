@@ -6,14 +6,14 @@ margins of them. `swarmtouch vehicle identify` measures them.
 
 import functools
 from pathlib import Path
-from typing import Any
 
-from attrs import Attribute, field, frozen
+from attrs import field, frozen
 
 from shared.config import structure
 from shared.errors import ConfigError
 from shared.scenario import Scenario
 from shared.toml_text import read_toml
+from shared.validators import not_negative, positive
 from shared.vehicles import vehicle_settings
 
 ENVELOPES = Path(__file__).resolve().parent.parent / "agents" / "vehicles" / "envelopes"
@@ -32,16 +32,6 @@ REACTION = 0.15
 """Time constant of the barriers of a vehicle that answers at once, s: sensing, a control step, a message."""
 
 
-def _positive(_: Any, attribute: "Attribute[Any]", value: float) -> None:
-    if not value > 0:
-        raise ValueError(f"{attribute.name} must be > 0, not {value!r}")
-
-
-def _not_negative(_: Any, attribute: "Attribute[Any]", value: float) -> None:
-    if not value >= 0:
-        raise ValueError(f"{attribute.name} must be >= 0, not {value!r}")
-
-
 @frozen(kw_only=True)
 class AxisEnvelope:
     """One axis of a vehicle under its own position controller.
@@ -55,12 +45,12 @@ class AxisEnvelope:
         error: Largest acceleration that model and observer leave over, m/s^2.
     """
 
-    stiffness: float = field(validator=_positive)
-    damping: float = field(validator=_not_negative)
-    feed: float = field(validator=_not_negative)
-    lag: float = field(validator=_not_negative)
-    acceleration: float = field(validator=_positive)
-    error: float = field(validator=_not_negative)
+    stiffness: float = field(validator=positive)
+    damping: float = field(validator=not_negative)
+    feed: float = field(validator=not_negative)
+    lag: float = field(validator=not_negative)
+    acceleration: float = field(validator=positive)
+    error: float = field(validator=not_negative)
 
     @property
     def brake(self) -> float:
@@ -92,8 +82,8 @@ class Downwash:
         height: m.
     """
 
-    radius: float = field(default=0.3, validator=_not_negative)
-    height: float = field(default=1.0, validator=_not_negative)
+    radius: float = field(default=0.3, validator=not_negative)
+    height: float = field(default=1.0, validator=not_negative)
 
 
 @frozen(kw_only=True)
@@ -109,7 +99,7 @@ class Envelope:
     """
 
     about: str
-    tau: float = field(validator=_not_negative)
+    tau: float = field(validator=not_negative)
     horizontal: AxisEnvelope
     vertical: AxisEnvelope
     downwash: Downwash = Downwash()

@@ -17,7 +17,8 @@ import struct
 from typing import NamedTuple
 
 from shared.errors import ConfigError, DecodeError
-from shared.scenario import MAX_PORT, Net
+from shared.scenario import Net
+from shared.validators import MAX_PORT
 
 GROUP = "224.0.0.225"
 """Link-local: no router forwards it, and switches flood it, whoever they believe to listen."""

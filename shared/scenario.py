@@ -1,76 +1,25 @@
 """What a scenario may say: one frozen class per TOML table, with its defaults and single-value checks."""
 
-import re
-from typing import Any, Literal
+from typing import Literal
 
-from attrs import Attribute, Factory, field, frozen
+from attrs import Factory, field, frozen
 from attrs.validators import optional
 
-from shared.messages import MAX_DRONE_ID
-from shared.order import FASTEST_HZ
 from shared.pointer_link import DEFAULT_SOCKET
+from shared.validators import (
+    check_box,
+    check_endpoint,
+    drone_number,
+    hand_rate,
+    key_chunk,
+    not_negative,
+    port,
+    positive,
+)
 
-MAX_PORT = 65_535
-SLOWEST_HAND = 10.0
-"""A hand is stale after 0.25 s: at this rate one sample may be lost, Hz."""
-
-_ENDPOINT = re.compile(r"[a-z][a-z-]*/[^\s?#]*?(:(?P<port>[0-9]{1,20}))?([?#].*)?")
 Law = Literal["paper", "stable"]
 Profile = Literal["laptop", "compose", "field", "radio"]
 Shape = Literal["rhombus", "triangle", "line", "vee", "grid", "custom"]
-
-
-def _positive(_: Any, attribute: "Attribute[Any]", value: float) -> None:
-    if not value > 0:
-        raise ValueError(f"{attribute.name} must be > 0, not {value!r}")
-
-
-def _not_negative(_: Any, attribute: "Attribute[Any]", value: float) -> None:
-    if not value >= 0:
-        raise ValueError(f"{attribute.name} must be >= 0, not {value!r}")
-
-
-def _hand_rate(_: Any, attribute: "Attribute[Any]", value: float) -> None:
-    if not SLOWEST_HAND <= value <= FASTEST_HZ:
-        raise ValueError(
-            f"{attribute.name} must be {SLOWEST_HAND:g} to {FASTEST_HZ} Hz, not {value!r}:"
-            " a slower hand is stale before the next sample comes"
-        )
-
-
-def _port(_: Any, attribute: "Attribute[Any]", value: int) -> None:
-    if not 0 <= value <= MAX_PORT:
-        raise ValueError(f"{attribute.name} must be a port from 0 to {MAX_PORT}, not {value!r}")
-
-
-def check_endpoint(key: str, endpoint: str) -> None:
-    """Looks whether a Zenoh endpoint has a protocol, and no port that is none.
-
-    Raises:
-        ValueError: With the key.
-    """
-    match = _ENDPOINT.fullmatch(endpoint)
-    if not match or (match["port"] and int(match["port"]) > MAX_PORT):
-        raise ValueError(f"{key} {endpoint!r}: expected PROTOCOL/HOST:PORT, for example tcp/10.0.0.2:7447")
-
-
-def _check_box(low: "Triple | Pair", high: "Triple | Pair") -> None:
-    if any(a > b for a, b in zip(low, high, strict=True)):
-        raise ValueError(f"min {low} must not exceed max {high}")
-
-
-def _key_chunk(_: Any, attribute: "Attribute[Any]", value: str) -> None:
-    if not value or not all(c.isalnum() or c in "-_" for c in value):
-        raise ValueError(
-            f"{attribute.name} must be letters, digits, - or _ (it becomes a key prefix), not {value!r}"
-        )
-
-
-def _drone_number(_: Any, attribute: "Attribute[Any]", value: int) -> None:
-    if not 0 < value <= MAX_DRONE_ID:
-        raise ValueError(f"{attribute.name} must be 1 to {MAX_DRONE_ID}, not {value!r}")
-
-
 Triple = tuple[float, float, float]
 Pair = tuple[float, float]
 
@@ -85,9 +34,9 @@ class Swarm:
         total_limit: `stable`: bound of the summed corrections along the deepest path, m.
     """
 
-    name: str = field(default="swarm", validator=_key_chunk)
+    name: str = field(default="swarm", validator=key_chunk)
     law: Law = "stable"
-    total_limit: float = field(default=0.5, validator=_positive)
+    total_limit: float = field(default=0.5, validator=positive)
 
 
 @frozen(kw_only=True)
@@ -100,9 +49,9 @@ class Rates:
         hand_hz: The relay sends no more poses of the hand than these, the newest; agents step at it.
     """
 
-    control_hz: float = field(default=60.0, validator=_positive)
-    max_control_hz: float = field(default=120.0, validator=_positive)
-    hand_hz: float = field(default=60.0, validator=_hand_rate)
+    control_hz: float = field(default=60.0, validator=positive)
+    max_control_hz: float = field(default=120.0, validator=positive)
+    hand_hz: float = field(default=60.0, validator=hand_rate)
 
 
 @frozen(kw_only=True)
@@ -113,7 +62,7 @@ class Clip:
     max: Pair
 
     def __attrs_post_init__(self) -> None:
-        _check_box(self.min, self.max)
+        check_box(self.min, self.max)
 
 
 @frozen(kw_only=True)
@@ -132,13 +81,13 @@ class Hand:
     """
 
     mapping: Literal["absolute", "relative"] = "absolute"
-    gain: float = field(default=1.0, validator=_positive)
+    gain: float = field(default=1.0, validator=positive)
     offset: Triple = (0.0, 0.0, 0.0)
     height: float | None = None
     home: Pair = (0.0, 0.0)
     clip: Clip | None = None
     follow_yaw: bool = True
-    max_speed: float = field(default=0.75, validator=_positive)
+    max_speed: float = field(default=0.75, validator=positive)
 
 
 @frozen(kw_only=True)
@@ -166,11 +115,11 @@ class Impedance:
         links: Exceptions by link name, for example `"2-4"`.
     """
 
-    mass: float = field(default=1.9, validator=_positive)
-    damping: float = field(default=12.6, validator=_not_negative)
-    stiffness: float = field(default=21.0, validator=_positive)
+    mass: float = field(default=1.9, validator=positive)
+    damping: float = field(default=12.6, validator=not_negative)
+    stiffness: float = field(default=21.0, validator=positive)
     gain: float = -7.0
-    limit: float = field(default=0.25, validator=_positive)
+    limit: float = field(default=0.25, validator=positive)
     links: tuple[LinkSettings, ...] = ()
 
 
@@ -185,7 +134,7 @@ class Drone:
         offset: Place relative to the weighted references, formation frame, m.
     """
 
-    id: int = field(validator=_drone_number)
+    id: int = field(validator=drone_number)
     references: tuple[str, ...]
     weights: tuple[float, ...] | None = None
     offset: Triple = (0.0, 0.0, 0.0)
@@ -211,10 +160,10 @@ class FormationSettings:
     """
 
     shape: Shape = "rhombus"
-    n: int = field(default=4, validator=_positive)
-    spacing: float = field(default=0.5, validator=_positive)
-    width: float = field(default=0.5, validator=_positive)
-    columns: int | None = field(default=None, validator=optional(_positive))
+    n: int = field(default=4, validator=positive)
+    spacing: float = field(default=0.5, validator=positive)
+    width: float = field(default=0.5, validator=positive)
+    columns: int | None = field(default=None, validator=optional(positive))
     drones: tuple[Drone, ...] = ()
     links: tuple[str, ...] | None = None
     absent: tuple[int, ...] = ()
@@ -236,8 +185,8 @@ class Obstacle:
     name: str
     x: float
     y: float
-    radius: float | None = field(default=None, validator=optional(_positive))
-    height: float | None = field(default=None, validator=optional(_positive))
+    radius: float | None = field(default=None, validator=optional(positive))
+    height: float | None = field(default=None, validator=optional(positive))
 
 
 @frozen(kw_only=True)
@@ -255,10 +204,10 @@ class Walker:
 
     name: str
     path: tuple[Pair, ...]
-    speed: float = field(default=1.0, validator=_positive)
-    radius: float = field(default=0.3, validator=_positive)
-    height: float = field(default=1.8, validator=_positive)
-    start: float = field(default=0.0, validator=_not_negative)
+    speed: float = field(default=1.0, validator=positive)
+    radius: float = field(default=0.3, validator=positive)
+    height: float = field(default=1.8, validator=positive)
+    start: float = field(default=0.0, validator=not_negative)
 
     def __attrs_post_init__(self) -> None:
         if not self.path:
@@ -275,9 +224,9 @@ class FieldSettings:
         radius: Radius of the obstacle, m.
     """
 
-    eta: float = field(validator=_positive)
-    d0: float = field(validator=_positive)
-    radius: float = field(validator=_positive)
+    eta: float = field(validator=positive)
+    d0: float = field(validator=positive)
+    radius: float = field(validator=positive)
 
 
 @frozen(kw_only=True)
@@ -295,12 +244,12 @@ class Avoidance:
     """
 
     rule: Literal["field", "projection"] = "field"
-    xi: float = field(default=2.0, validator=_positive)
-    speed: float = field(default=0.5, validator=_positive)
+    xi: float = field(default=2.0, validator=positive)
+    speed: float = field(default=0.5, validator=positive)
     columns: FieldSettings = FieldSettings(eta=0.002, d0=0.30, radius=0.12)
     separation: FieldSettings = FieldSettings(eta=2e-4, d0=0.12, radius=0.18)
-    projection_radius: float = field(default=0.27, validator=_positive)
-    projection_margin: float = field(default=0.06, validator=_not_negative)
+    projection_radius: float = field(default=0.27, validator=positive)
+    projection_margin: float = field(default=0.06, validator=not_negative)
 
 
 @frozen(kw_only=True)
@@ -325,9 +274,9 @@ class VehicleSettings:
     body: Literal["identified", "crazyflie"] | None = None
     link_loss: Literal["crazyflie", "hover"] | None = None
     envelope: str | None = None
-    tau: float | None = field(default=None, validator=optional(_not_negative))
-    battery: float | None = field(default=None, validator=optional(_not_negative))
-    endurance: float | None = field(default=None, validator=optional(_positive))
+    tau: float | None = field(default=None, validator=optional(not_negative))
+    battery: float | None = field(default=None, validator=optional(not_negative))
+    endurance: float | None = field(default=None, validator=optional(positive))
     pose_silence: tuple[float, float] | None = None
 
 
@@ -359,12 +308,12 @@ class Limits:
         landing_speed: Descent rate, m/s.
     """
 
-    speed: float = field(default=1.0, validator=_positive)
-    acceleration: float = field(default=3.0, validator=_positive)
-    safety_distance: float = field(default=0.30, validator=_positive)
-    takeoff_height: float = field(default=1.2, validator=_positive)
-    takeoff_speed: float = field(default=0.5, validator=_positive)
-    landing_speed: float = field(default=0.5, validator=_positive)
+    speed: float = field(default=1.0, validator=positive)
+    acceleration: float = field(default=3.0, validator=positive)
+    safety_distance: float = field(default=0.30, validator=positive)
+    takeoff_height: float = field(default=1.2, validator=positive)
+    takeoff_speed: float = field(default=0.5, validator=positive)
+    landing_speed: float = field(default=0.5, validator=positive)
 
 
 @frozen(kw_only=True)
@@ -380,12 +329,12 @@ class Fence:
 
     min: Triple | None = None
     max: Triple | None = None
-    room: float = field(default=3.0, validator=_positive)
-    margin: float = field(default=0.15, validator=_not_negative)
+    room: float = field(default=3.0, validator=positive)
+    margin: float = field(default=0.15, validator=not_negative)
 
     def __attrs_post_init__(self) -> None:
         if self.min is not None and self.max is not None:
-            _check_box(self.min, self.max)
+            check_box(self.min, self.max)
 
 
 @frozen(kw_only=True)
@@ -413,7 +362,7 @@ class Net:
     """
 
     profile: Profile = "laptop"
-    base_port: int = field(default=7460, validator=_port)
+    base_port: int = field(default=7460, validator=port)
     endpoint: str | None = None
     endpoints: dict[str, str] = Factory(dict)
     router: str | None = None
@@ -421,7 +370,7 @@ class Net:
     multicast: str = ""
     interface: str = "lo"
     adminspace: bool = False
-    full_mesh: int = field(default=16, validator=_not_negative)
+    full_mesh: int = field(default=16, validator=not_negative)
     pointer: str = DEFAULT_SOCKET
 
     def __attrs_post_init__(self) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from observer.console import PORT
 from shared.nodes import LOOPBACK
-from shared.scenario import MAX_PORT
+from shared.validators import MAX_PORT
 
 TOKEN_VARIABLE = "SWARMTOUCH_CONSOLE_TOKEN"  # noqa: S105  the name of a variable, no token
 RANDOM_TOKEN = "random"  # noqa: S105  a word, no token

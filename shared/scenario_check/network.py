@@ -8,9 +8,10 @@ from shared.codec import MAX_PAYLOAD, encode
 from shared.formation import Formation, Link
 from shared.messages import MAX_POSITION, MOST_LOST, DroneState, Heard, Mode, Seen, Vector
 from shared.nodes import all_nodes, drone_node
-from shared.scenario import MAX_PORT, Scenario
+from shared.scenario import Scenario
 from shared.scenario_check.finding import Finding
 from shared.topics import DRONE_STATE, HAND
+from shared.validators import MAX_PORT
 from shared.vehicles import vehicle_settings
 
 _LARGEST_NUMBER = 2**64 - 1

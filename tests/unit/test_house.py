@@ -54,6 +54,7 @@ PURE = [
             "spreadsheet",
             "topics",
             "uri",
+            "validators",
         )
     ),
 ]
