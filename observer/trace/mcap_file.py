@@ -133,7 +133,9 @@ class McapFile:
     def _record_at(self, place: int) -> Located | None:
         """Returns the record at a place if another one, or the end, follows it."""
         found = self._frame(place)
-        if found is None or found.end == self._end or self._frame(found.end) is not None:
+        if found is None or not self._holds(found):
+            return None
+        if found.end == self._end or self._frame(found.end) is not None:
             return found
         # The last record of a file that was cut off may follow: its frame goes beyond the end.
         head = self._at(found.end, _HEAD.size)
@@ -141,6 +143,13 @@ class McapFile:
             return None if self.has_end else found
         opcode, length = _HEAD.unpack(head)
         return found if not self.has_end and opcode in _KNOWN and length < _LONGEST else None
+
+    def _holds(self, found: Located) -> bool:
+        """Says whether metadata ends where it says: a wrong length may meet a later record."""
+        try:
+            return found.opcode != METADATA or bool(read_metadata(self.content(found)))
+        except DamageError:
+            return False
 
     def _next_after(self, place: int) -> int | None:
         """Looks for the next place from which on there are records."""

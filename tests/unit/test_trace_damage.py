@@ -20,7 +20,7 @@ from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from observer.trace.layout import SCENARIO as SCENARIO_RECORD
-from observer.trace.mcap_file import CHUNK
+from observer.trace.mcap_file import CHUNK, METADATA, McapFile
 from observer.trace.order import Record, TimeOrder
 from observer.trace.read import MOST_IN_MEMORY, Trace, open_trace
 from observer.trace.write import TraceWriter
@@ -175,6 +175,21 @@ def test_a_damaged_byte_costs_at_most_a_chunk(tmp_path: Path, layout: str, ends:
         assert trace.faults or missing <= 0
 
     check()
+
+
+def test_a_wrong_length_that_meets_a_later_record_hides_nothing(tmp_path: Path) -> None:
+    path = write(tmp_path, SENT, every=6)
+    content = path.read_bytes()
+    (tmp_path / "scenario.toml").write_text(dump_scenario(SCENARIO), encoding="utf-8")
+    with path.open("rb") as stream:
+        records = list(McapFile(stream).records())
+    metadata = next(record for record in records if record.opcode == METADATA)
+    later = [record for record in records if record.opcode == CHUNK][4]
+    length = struct.pack("<Q", later.end - metadata.begin)
+    path.write_bytes(content[: metadata.begin - 8] + length + content[metadata.begin :])
+    trace = open_trace(path)
+    assert pairs(trace) == SENT
+    assert any("damaged bytes were skipped" in fault for fault in trace.faults)
 
 
 def test_without_its_scenario_a_trace_takes_the_one_beside_it(tmp_path: Path) -> None:
