@@ -5,11 +5,13 @@ margins of them. `swarmtouch vehicle identify` measures them.
 """
 
 import functools
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+import msgspec
 from attrs import field, frozen
 
-from shared.config import structure
 from shared.errors import ConfigError
 from shared.scenario import Scenario
 from shared.toml_text import read_toml
@@ -139,4 +141,21 @@ def load_envelope(source: str) -> Envelope:
     elif not path.is_file():
         shipped = ", ".join(sorted(each.stem for each in ENVELOPES.glob("*.toml")))
         raise ConfigError(f"{source}: no such envelope of a vehicle; those that ship: {shipped}")
-    return structure(read_toml(path, "`swarmtouch vehicle identify` makes one"), Envelope, str(path))
+    tree = read_toml(path, "`swarmtouch vehicle identify` makes one")
+    try:
+        # Not as a scenario is read: who flies reads envelopes too, and has none of that in memory.
+        envelope = msgspec.convert(tree, Envelope)
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"{path}: {error}") from error
+    for key in _unknown(tree, msgspec.to_builtins(envelope)):
+        raise ConfigError(f"{path}: unknown key {key!r}")
+    return envelope
+
+
+def _unknown(tree: Mapping[str, Any], known: Mapping[str, Any]) -> Iterator[str]:
+    """Yields the keys of a tree that mean nothing, dotted."""
+    for key, value in tree.items():
+        if key not in known:
+            yield key
+        elif isinstance(value, Mapping):
+            yield from (f"{key}.{inner}" for inner in _unknown(value, known[key]))

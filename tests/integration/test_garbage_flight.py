@@ -29,8 +29,6 @@ from tests.integration.recorder import RELAY, WORLD, Recorder
 from tests.integration.swarm import launched
 from tests.strategies import fields_of, garbage, refusal
 
-pytestmark = pytest.mark.parallel
-
 PACE_S = 0.004
 """Between two foreign messages: slow enough for every one to be looked at."""
 MADE = 400

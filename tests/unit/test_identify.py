@@ -1,6 +1,7 @@
 """What `swarmtouch vehicle identify` finds: what is known, what ships, and in recorded flights."""
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from deploy.vehicle.identify import identify
 from deploy.vehicle.motion import RATE_HZ, excited
 from shared.arrays import Vec
 from shared.config import structure
-from shared.envelope import AxisEnvelope, Envelope, load_envelope
+from shared.envelope import ENVELOPES, AxisEnvelope, Envelope, load_envelope
 from shared.errors import ConfigError
 from shared.toml_text import parse_toml
 
@@ -120,3 +121,20 @@ def test_a_body_that_is_told_nothing_says_nothing(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("deploy.vehicle.identify.excited", lambda _: still)
     with pytest.raises(ConfigError, match="no set-point moves sideways"):
         identify("sim:identified")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("damping = 8.65", "dampling = 8.65", "missing required field `damping` - at `$.horizontal`"),
+        ("radius = 0.3", "radius = 0.3\ncolour = 1", "unknown key 'downwash.colour'"),
+        ("stiffness = 15.64", "stiffness = -1", "stiffness must be > 0, not -1.0 - at `$.horizontal`"),
+        ("stiffness = 15.64", "stiffness = nan", "stiffness must be > 0, not nan - at `$.horizontal`"),
+        ("tau = 0.45", 'tau = "soon"', "Expected `float`, got `str` - at `$.tau`"),
+    ],
+)
+def test_a_damaged_envelope_is_refused_with_file_and_key(old: str, new: str, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text((ENVELOPES / "identified.toml").read_text().replace(old, new, 1))
+    with pytest.raises(ConfigError, match=re.escape(f"{file}: ") + ".*" + re.escape(said)):
+        load_envelope(str(file))
