@@ -100,7 +100,7 @@ class Monitor:
     @property
     def stopped(self) -> tuple[int, ...]:
         """The drones whose motors are off for good, by STOP."""
-        return tuple(drone for drone, state in self.stats.latest.items() if state.mode is Mode.STOP)
+        return tuple(sorted(drone for drone, state in self.stats.latest.items() if state.mode is Mode.STOP))
 
     @property
     def ended_by_hand(self) -> bool:
