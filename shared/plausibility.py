@@ -121,14 +121,14 @@ def check_ahead(position: Vector, velocity: Vector, ahead: Vector, pace: Vector,
         limits: What is possible.
 
     Raises:
-        DecodeError: `outside`, `too-fast` or `ahead`.
+        DecodeError: `outside`, `too-fast` or `unreachable`.
     """
     check_possible(ahead, pace, limits)
     x, y, z = position
     a, b, c = ahead
     u, v, w = velocity
     if not _length(a - x, b - y, c - z) <= FURTHEST_AHEAD * _length(u, v, w) + AHEAD_SLACK:
-        raise DecodeError("ahead", f"at {_said(position)}, and soon at {_said(ahead)} m")
+        raise DecodeError("unreachable", f"at {_said(position)}, and soon at {_said(ahead)} m")
 
 
 def believe(

@@ -208,11 +208,11 @@ class Senses:
         """
         state, at_ns = sensed.message, sensed.arrival_ns
         try:
+            believed = believe(self._believed.get(state.id), state.position, state.velocity, at_ns, bodies)
             check_possible(state.goal, state.goal_velocity, bodies)
             ahead, pace = state.ahead or state.position, state.pace or state.velocity
             check_ahead(state.position, state.velocity, ahead, pace, bodies)
-            known = self._believed.get(state.id)
-            self._believed[state.id] = believe(known, state.position, state.velocity, at_ns, bodies)
+            self._believed[state.id] = believed
         except DecodeError:
             self.doubted_ns[key] = at_ns
             raise

@@ -205,7 +205,7 @@ IMPOSSIBLE = {
     "jump": {"position": (1.0, 1.0, 1.2)},
     "too-fast": {"velocity": (30.0, 0.0, 0.0)},
     "outside": {"position": (0.0, 60.0, 1.2)},
-    "ahead": {"ahead": (0.3, 0.0, 1.2)},
+    "unreachable": {"ahead": (0.3, 0.0, 1.2)},
 }
 
 
