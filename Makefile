@@ -14,7 +14,7 @@ COMPILE := UV_PROJECT_ENVIRONMENT=$(COMPILER) $(UV) sync --frozen --quiet --no-d
 	--no-install-project --python $(BIN)/python && $(COMPILER)/bin/python -m deploy.compile
 WHERE_POSSIBLE := if $(BIN)/python -m deploy.compile.toolchain; then $(COMPILE) || echo "flying in the pure form"; fi
 
-.PHONY: help demo env compile test check lint chip chaos wheels clean
+.PHONY: help demo env native compile test check lint chip chaos wheels clean
 
 help:  ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' Makefile | expand -t 8
@@ -23,17 +23,19 @@ demo: $(RUNTIME)  ## fly the paper's rhombus for 30 s, simulated, or for longer 
 	@$(WHERE_POSSIBLE)
 	$(BIN)/swarmtouch up slalom --console --hand "scripted:tour?duration=26" --glove terminal://
 
-env: $(DEVELOPMENT)  ## set up everything that developing needs in .venv/
+env: native  ## set up everything that developing needs in .venv/
+
+native: $(DEVELOPMENT)
 	@$(WHERE_POSSIBLE)
 
 compile: $(RUNTIME)  ## compile the control law to native code; demo, env and test do it where there is a C compiler
 	@$(BIN)/python -m deploy.compile.toolchain && $(COMPILE)
 
-# What measures flights of real processes wants the machine to itself; everything else shares it. What a busy machine spoils
-# is flown again, twice at most and by name in the output: a defect spoils every flight, noise one.
+# What measures flights of real processes wants the machine to itself; everything else shares it. What a busy machine
+# spoils is flown again, twice at most and by name in the output: a defect spoils every flight, noise one.
 # The pure form skips the long flights: tests/unit/test_forms.py shows that both forms fly them to the same bits.
-test: lint  ## everything CI runs: format, lint, types, import contracts, all tests
-	@$(WHERE_POSSIBLE)
+test:  ## everything CI runs: format, lint, types, import contracts, all tests
+	@$(MAKE) --jobs=2 --output-sync=target lint native
 	$(BIN)/pytest --numprocesses auto tests/unit tests/contract tests/replay
 	SWARMTOUCH_PURE=1 $(BIN)/pytest --numprocesses auto -m "law and not slow" tests/unit tests/contract tests/replay
 	$(BIN)/pytest --numprocesses 2 --reruns 2 -raR -m parallel tests/integration
