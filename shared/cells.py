@@ -3,12 +3,13 @@
 import math
 from typing import Final, Generic, TypeVar, cast, final
 
-from mypy_extensions import mypyc_attr
 
-
-@mypyc_attr(acyclic=True)
 class Place:
-    """Where something is in the plane, m, and who comes after it in its cell."""
+    """Where something is in the plane, m, and who comes after it in its cell.
+
+    The collector knows of these, although they are in no cycle: only then does Python let go of a long chain
+    without a call within a call for each, and without writing over memory.
+    """
 
     def __init__(self, x: float, y: float) -> None:
         self.x: Final = x
@@ -46,7 +47,7 @@ class Cells(Generic[P]):
         self._low_x, self._low_y = low_x, low_y
         self._columns = math.floor(width / side) + 1
         self._rows = math.floor(height / side) + 1
-        self.cells: list[P | None] = [None] * (self._columns * self._rows)
+        self.cells: list[Place | None] = [None] * (self._columns * self._rows)
         for place in reversed(places):
             cell = self._column(place) * self._rows + self._row(place)
             place.after = self.cells[cell]
@@ -56,7 +57,7 @@ class Cells(Generic[P]):
         """Returns who else is within reach of one of the places."""
         column, row = self._column(own), self._row(own)
         x, y, squared = own.x, own.y, self._reach * self._reach
-        found: list[P] = []
+        found: list[Place] = []
         for i in range(max(column - 1, 0), min(column + 2, self._columns)):
             for j in range(max(row - 1, 0), min(row + 2, self._rows)):
                 place = self.cells[i * self._rows + j]
@@ -64,13 +65,13 @@ class Cells(Generic[P]):
                     dx, dy = place.x - x, place.y - y
                     if dx * dx + dy * dy <= squared and place is not own:
                         found.append(place)
-                    place = cast("P | None", place.after)
-        return found
+                    place = place.after
+        return cast("list[P]", found)
 
-    def _column(self, place: P) -> int:
+    def _column(self, place: Place) -> int:
         return math.floor((place.x - self._low_x) / self._side)
 
-    def _row(self, place: P) -> int:
+    def _row(self, place: Place) -> int:
         return math.floor((place.y - self._low_y) / self._side)
 
 

@@ -1,12 +1,17 @@
 """The cell list finds exactly the pairs that a search over all pairs finds."""
 
 import itertools
+import subprocess
+import sys
+from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from shared.cells import Cells, Place, near_pairs
 
+ROOT = Path(__file__).resolve().parents[2]
 COORDINATE = st.floats(-4.0, 4.0)
 
 
@@ -34,6 +39,22 @@ def test_its_cost_does_not_grow_with_all_pairs() -> None:
 
 def _crowd(place: Place | None) -> int:
     return 0 if place is None else 1 + _crowd(place.after)
+
+
+CROWD = """
+from agents.control.safety.encounter import Clearance, drone_heard
+from shared.cells import Cells, Place
+here, clearance = (0.0, 0.0, 0.0), Clearance(0.3, 1.0, 1.0)
+for _ in range(3):
+    Cells([Place(0.0, 0.0) for _ in range(20_000)], 1.0)
+    Cells([drone_heard(here, here, here, 0.0, clearance, yields=True) for _ in range(20_000)], 1.0)
+"""
+
+
+@pytest.mark.timeout(60)
+def test_a_crowd_in_one_cell_is_let_go_of() -> None:
+    """Its chain is long: in compiled values that the collector does not know Python would write over memory."""
+    subprocess.run([sys.executable, "-c", CROWD], cwd=ROOT, check=True, timeout=50)
 
 
 def test_few_points_far_apart_make_few_cells() -> None:
