@@ -1,6 +1,6 @@
 """What a drone has to keep away from, from what it has heard: the word of others as encounters. Pure."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from agents.company import Company
 from agents.control.modes import GROUND, is_airborne
@@ -16,7 +16,7 @@ from agents.control.safety.encounter import (
 from shared.messages import ORIGIN, ObstacleState
 
 
-def drones_around(company: Company, keep: Mapping[int, Clearance], lag: float, now_ns: int) -> list[Encounter]:
+def drones_around(company: Company, keep: dict[int, Clearance], lag: float, now_ns: int) -> list[Encounter]:
     """Returns where the other drones are, or may be.
 
     One that is silent, or that does not see itself, may be anywhere from where it was to where it would have
@@ -39,7 +39,8 @@ def drones_around(company: Company, keep: Mapping[int, Clearance], lag: float, n
             found.append(drone_silent(state.position, state.velocity, age, keep[state.id], lag))
             continue
         yields = is_airborne(state.mode) and state.id not in company.deaf
-        ahead, pace = state.ahead or state.position, state.pace or state.velocity
+        ahead = state.position if state.ahead is None else state.ahead
+        pace = state.velocity if state.pace is None else state.pace
         found.append(
             drone_heard(ahead, pace, state.asked, min(heard, SILENT_AFTER), keep[state.id], yields=yields)
         )

@@ -55,6 +55,8 @@ class ObstacleWatch:
 
     def present(self, now_ns: int) -> list[tuple[ObstacleState, float]]:
         """Returns every obstacle that may be relied on to be there, and how long ago it was heard, s."""
+        if not self._known:
+            return []
         ages = [(known.state, (now_ns - known.arrival_ns) * 1e-9) for known in self._known.values()]
         return [(state, age) for state, age in ages if age <= state.valid_s]
 

@@ -11,6 +11,8 @@ the reference goes on from there.
 from dataclasses import dataclass
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control import avoidance
 from agents.control.avoidance import Field
 from agents.control.projection import project_swept
@@ -85,6 +87,7 @@ class SteeringSettings:
     safety: SafetySettings
 
 
+@mypyc_attr(acyclic=True, free_list_len=1)
 @final
 class Surroundings:
     """What there is to keep away from, beside columns and fence.
@@ -101,6 +104,7 @@ class Surroundings:
         self.hand_speed: Final = hand_speed
 
 
+@mypyc_attr(acyclic=True, free_list_len=1)
 @final
 class Steered:
     """Result of one step.
@@ -165,7 +169,7 @@ def steer(
     tau = settings.tau
     setpoint = clamp((x + tau * a, y + tau * b, z + tau * c), low, high)
     wish = Wish(setpoint, wanted, settings.acceleration)
-    guarded = guard(wish, motion, around.walkers + around.drones, settings.safety, dt, floor=floor)
+    guarded = guard(wish, motion, around.walkers, around.drones, settings.safety, dt, floor=floor)
     return Steered(
         _taken_up(Trajectory(point, velocity, lead, inside), guarded, speed, share, tau),
         guarded,
@@ -183,7 +187,7 @@ def _taken_up(trajectory: Trajectory, guarded: Guarded, speed: float, share: flo
     u, v, w = trajectory.velocity
     a, b, c = trajectory.lead
     if guarded.planar:
-        u, v, _ = pace
+        u, v = pace[0], pace[1]
         a, b = share * u, share * v
         x, y = guarded.setpoint[0] - tau * a, guarded.setpoint[1] - tau * b
     if guarded.upright:
@@ -215,7 +219,7 @@ def _towards(
 
 def _keep_off(trajectory: Trajectory, around: Surroundings, settings: SteeringSettings) -> Planar:
     """Returns the repulsion of every other drone and of who walks among them, m/s."""
-    x, y, _ = trajectory.point
+    x, y = trajectory.point[0], trajectory.point[1]
     u, v = avoidance.separation(x, y, around.drones, settings.separation)
     a, b = avoidance.separation(x, y, around.walkers, settings.separation)
     return (u + a, v + b)

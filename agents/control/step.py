@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control import modes
 from agents.control.goals import Guide, Row, goal_of
 from agents.control.hand import HandInput, HandSettings, MappedHand, freeze, map_hand
@@ -69,6 +71,7 @@ class Settings:
     landing_speed: float
 
 
+@mypyc_attr(acyclic=True, free_list_len=1)
 @final
 class Inputs:
     """What one step works on.
@@ -124,6 +127,7 @@ class Inputs:
         self.alone: Final = alone
 
 
+@mypyc_attr(acyclic=True)
 @final
 class State:
     """What one step hands to the next.
@@ -163,6 +167,7 @@ class State:
         self.stand_ins: Final = stand_ins
 
 
+@mypyc_attr(acyclic=True, free_list_len=1)
 @final
 class Output:
     """Result of one step.

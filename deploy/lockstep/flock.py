@@ -119,7 +119,7 @@ def _set_goals(flock: list[Member], hand: MappedHand, dt: float, *, stable: bool
         across, up = safety.horizontal, safety.vertical
         member.motion = watch(member.motion, member.position, flying, 0.0, dt, across, up)
         member.encounter = each = member.met()
-        x, y, _ = member.trajectory.point
+        x, y = member.trajectory.point[0], member.trajectory.point[1]
         ahead = max(ahead, (x - each.x) * (x - each.x) + (y - each.y) * (y - each.y))
         member.links = step_links(member.links, member.row.links, velocity, dt)
         lead = [reference.guide for reference in member.references]
@@ -144,9 +144,14 @@ def _reach(flock: list[Member], ahead: float) -> float:
         du, dv = each.u - mean_u, each.v - mean_v
         apart = max(apart, du * du + dv * dv)
     reach, closing = 0.0, 2.0 * math.sqrt(apart)
+    rules: SteeringSettings | None = None
+    clearance: Clearance | None = None
     for member in flock:
-        safety, field = member.steering.safety, member.steering.separation
+        if member.steering is rules and member.clearance is clearance:  # drones with equal vehicles share both
+            continue
+        rules, clearance = member.steering, member.clearance
+        safety, field = rules.safety, rules.separation
         brake = safety.planar.reach(closing + member.encounter.surprise, safety.horizontal.acceleration)
-        barrier = member.clearance.distance + brake
-        reach = max(reach, field.radius + field.d0 + ahead, barrier)
+        reach = max(reach, field.radius + field.d0 + ahead)
+        reach = max(reach, clearance.distance + brake)
     return reach

@@ -70,7 +70,7 @@ class Drone:
         x, y, z = self.position
         u, v, w = velocity
         far = Wish((x + u, y + v, z + w), velocity, hard)
-        self.guarded = guard(far, self.motion, encounters, self.settings, TICK, floor=floor)
+        self.guarded = guard(far, self.motion, [], encounters, self.settings, TICK, floor=floor)
         told = self.motion = self.guarded.motion
         axes = (told.x, told.y, told.z)
         for axis, response in enumerate([self.settings.horizontal] * 2 + [self.settings.vertical]):
@@ -259,7 +259,7 @@ def test_where_nothing_is_near_the_mission_is_flown_to_the_bit(
         drone_silent(there, ORIGIN, 2.0, clearance(body), 0.1),
         walker_seen(there, ORIGIN, 0.0, 0.1, Berth(0.32, HAND_COMFORT)),
     ]
-    guarded = guard(wish, motion, others, settings(body), TICK, floor=True)
+    guarded = guard(wish, motion, [], others, settings(body), TICK, floor=True)
     assert guarded.setpoint == wish.setpoint
     assert guarded.kept
     assert not guarded.planar
@@ -329,7 +329,7 @@ def test_a_silent_body_may_be_anywhere_on_its_way(age: float, speed: float) -> N
         here = (share * min(age, 2.5) * speed, 0.1, 0.9)
         still = Wish(here, ORIGIN, 1.0)
         guarded = guard(
-            still, start_motion(here, ORIGIN, 0.0), [silent], settings("identified"), TICK, floor=True
+            still, start_motion(here, ORIGIN, 0.0), [], [silent], settings("identified"), TICK, floor=True
         )
         assert guarded.planar
         assert guarded.setpoint[1] > here[1]
@@ -342,6 +342,6 @@ def test_who_never_yields_comes_before_who_does() -> None:
     hand = walker_seen((-0.25, 0.0, 1.2), (0.8, 0.0, 0.0), 0.0, 0.0, rules.hand)
     drone = drone_heard((0.25, 0.0, 1.2), ORIGIN, ORIGIN, 0.0, kept, yields=True)
     motion: Motion = start_motion(here, ORIGIN, 0.0)
-    guarded = guard(Wish(here, ORIGIN, 1.0), motion, [drone, hand], rules, TICK, floor=True)
+    guarded = guard(Wish(here, ORIGIN, 1.0), motion, [hand], [drone], rules, TICK, floor=True)
     assert guarded.setpoint[0] > 0.2
     assert not guarded.kept

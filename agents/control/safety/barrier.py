@@ -12,7 +12,10 @@ the acceleration that opens the gap.
 import math
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
 
+
+@mypyc_attr(acyclic=True)
 @final
 class Curve:
     """One barrier's parameters.

@@ -8,11 +8,13 @@ import math
 from dataclasses import dataclass
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.safety.barrier import Curve
 from agents.control.safety.encounter import COINCIDENT, STANDSTILL, Berth, Encounter
 from agents.control.safety.halfplanes import HalfPlane
 from agents.control.safety.response import Response
-from agents.control.vectors import Vector
+from agents.control.vectors import Planar, Vector
 
 STATIC: Final = 0
 UNYIELDING: Final = 1
@@ -53,63 +55,92 @@ class SafetySettings:
     over: float
 
 
+@mypyc_attr(acyclic=True, free_list_len=1)
 @final
 class Demands:
     """What is demanded at one moment.
 
+    Args:
+        asked_x: Horizontal acceleration that is asked for, m/s^2.
+        asked_y: The same.
+        ranks: Where half-planes are put, by rank; None: all that counts is whether that meets them.
+
     Attributes:
-        planes: Half-planes of horizontal accelerations.
-        ranks: The rank of each.
+        ranks: Half-planes of horizontal accelerations, the most important rank first.
+        met: Whether what is asked for meets all of them.
         aside_x: Where to evade to, m/s^2.
         aside_y: The same.
         least: Smallest vertical acceleration, m/s^2.
         most: Largest one.
     """
 
-    def __init__(self) -> None:
-        self.planes: list[HalfPlane] = []
-        self.ranks: list[int] = []
+    def __init__(self, asked_x: float, asked_y: float, ranks: list[list[HalfPlane]] | None) -> None:
+        self.asked_x: Final = asked_x
+        self.asked_y: Final = asked_y
+        self.ranks: Final = ranks
+        self.met = True
         self.aside_x = self.aside_y = 0.0
         self.least, self.most = -math.inf, math.inf
 
-    def allow(self, x: float, y: float) -> bool:
-        """Says whether a horizontal acceleration meets all of them."""
-        return all(plane.x * x + plane.y * y >= plane.least for plane in self.planes)
-
-    def by_rank(self) -> list[list[HalfPlane]]:
-        """Returns the half-planes, the most important rank first."""
-        found: list[list[HalfPlane]] = [[], [], [], []]
-        for i in range(len(self.planes)):
-            found[self.ranks[i]].append(self.planes[i])
-        return found
-
     def add(self, rank: int, x: float, y: float, least: float) -> None:
         """Adds a half-plane `x a + y b >= least`."""
-        self.planes.append(HalfPlane(x, y, least))
-        self.ranks.append(rank)
+        self.met = self.met and x * self.asked_x + y * self.asked_y >= least
+        if self.ranks is not None:
+            self.ranks[rank].append(HalfPlane(x, y, least))
 
 
 def demands_on(
-    ahead: Vector, pace: Vector, encounters: list[Encounter], settings: SafetySettings, *, floor: bool
+    asked: Planar,
+    ahead: Vector,
+    pace: Vector,
+    walkers: list[Encounter],
+    drones: list[Encounter],
+    settings: SafetySettings,
+    *,
+    floor: bool,
 ) -> Demands:
-    """Returns all that is demanded.
+    """Returns what is demanded; half-planes only where what is asked for does not meet all of them.
 
     Args:
+        asked: Horizontal acceleration that is asked for, m/s^2.
         ahead: Own point ahead, m.
         pace: Its velocity, m/s.
-        encounters: What there is to keep away from, beside columns and fence.
+        walkers: What there is to keep away from, beside columns and fence.
+        drones: The same.
         settings: Vehicle, barriers and bounds.
         floor: Whether the lower bound of the height holds.
     """
-    demands = Demands()
+    x, y = asked
+    demands = Demands(x, y, None)
+    _demand(demands, ahead, pace, walkers, drones, settings, floor=floor)
+    if not demands.met:
+        # Mostly all are met, and computing them again is cheaper than always making objects of them.
+        demands = Demands(x, y, [[], [], [], []])
+        _demand(demands, ahead, pace, walkers, drones, settings, floor=floor)
+    return demands
+
+
+def _demand(
+    demands: Demands,
+    ahead: Vector,
+    pace: Vector,
+    walkers: list[Encounter],
+    drones: list[Encounter],
+    settings: SafetySettings,
+    *,
+    floor: bool,
+) -> None:
+    """Adds all that is demanded."""
     _keep_in(demands, ahead, pace, settings, floor=floor)
     for column in settings.columns:
         if _reaches(column, ahead, pace, settings):
             _keep_off(demands, column, ahead, pace, settings, STATIC)
-    for encounter in encounters:
-        if _reaches(encounter, ahead, pace, settings):
-            _keep_off(demands, encounter, ahead, pace, settings, YIELDING if encounter.yields else UNYIELDING)
-    return demands
+    for walker in walkers:
+        if _reaches(walker, ahead, pace, settings):
+            _keep_off(demands, walker, ahead, pace, settings, YIELDING if walker.yields else UNYIELDING)
+    for drone in drones:
+        if _reaches(drone, ahead, pace, settings):
+            _keep_off(demands, drone, ahead, pace, settings, YIELDING if drone.yields else UNYIELDING)
 
 
 def _keep_in(demands: Demands, ahead: Vector, pace: Vector, settings: SafetySettings, *, floor: bool) -> None:
@@ -118,8 +149,11 @@ def _keep_in(demands: Demands, ahead: Vector, pace: Vector, settings: SafetySett
     u, v, w = pace
     low_x, low_y, low_z = settings.low
     high_x, high_y, high_z = settings.high
-    _between(demands, x - low_x, high_x - x, u, 1.0, 0.0, settings)
-    _between(demands, y - low_y, high_y - y, v, 0.0, 1.0, settings)
+    # One comparison for all four walls, which mostly are far away: a reach grows with the speed.
+    reach = settings.planar.reach(abs(u) + abs(v), settings.horizontal.acceleration)
+    if not (x - low_x >= reach and high_x - x >= reach and y - low_y >= reach and high_y - y >= reach):
+        _between(demands, x - low_x, high_x - x, u, 1.0, 0.0, settings)
+        _between(demands, y - low_y, high_y - y, v, 0.0, 1.0, settings)
     curve = settings.upright
     reach = curve.reach(abs(w), settings.vertical.acceleration)
     if floor and z - low_z < reach:
@@ -142,9 +176,8 @@ def _between(
 
 def _reaches(encounter: Encounter, ahead: Vector, pace: Vector, settings: SafetySettings) -> bool:
     """Says whether an encounter is near enough, and fast enough, to demand anything; never no too much."""
-    x, y, _ = ahead
-    u, v, _ = pace
-    dx, dy = x - encounter.x, y - encounter.y
+    u, v = pace[0], pace[1]
+    dx, dy = ahead[0] - encounter.x, ahead[1] - encounter.y
     closing = encounter.surprise + abs(u - encounter.u) + abs(v - encounter.v)
     tx, ty = encounter.trail
     trail = abs(tx) + abs(ty)

@@ -9,6 +9,8 @@ acceleration: the set-point lies ahead of the body for the sake of the vehicle's
 import math
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.safety.demands import Demands, SafetySettings, demands_on
 from agents.control.safety.encounter import Encounter
 from agents.control.safety.halfplanes import nearest
@@ -17,6 +19,7 @@ from agents.control.safety.response import asked_by, setpoint_for, tell
 from agents.control.vectors import Planar, Vector
 
 
+@mypyc_attr(acyclic=True, free_list_len=1)
 @final
 class Wish:
     """What the mission wants.
@@ -33,6 +36,7 @@ class Wish:
         self.acceleration: Final = acceleration
 
 
+@mypyc_attr(acyclic=True, free_list_len=1)
 @final
 class Guarded:
     """What is done.
@@ -71,27 +75,35 @@ class Guarded:
 
 
 def guard(
-    wish: Wish, motion: Motion, encounters: list[Encounter], settings: SafetySettings, dt: float, *, floor: bool
+    wish: Wish,
+    motion: Motion,
+    walkers: list[Encounter],
+    drones: list[Encounter],
+    settings: SafetySettings,
+    dt: float,
+    *,
+    floor: bool,
 ) -> Guarded:
     """Decides what the vehicle is told.
 
     Args:
         wish: What the mission wants.
         motion: The own body.
-        encounters: What there is to keep away from, beside columns and fence.
+        walkers: What there is to keep away from, beside columns and fence: who does not look.
+        drones: The same: other drones.
         settings: Vehicle, barriers and bounds.
         dt: Time since the last step, s.
         floor: Whether the lower bound of the height holds: not while taking off or landing.
     """
     horizontal, vertical = settings.horizontal, settings.vertical
     ahead, pace = point_ahead(motion, horizontal, vertical)
-    demands = demands_on(ahead, pace, encounters, settings, floor=floor)
     x, y, z = wish.setpoint
     a, b = asked_by(x, motion.x, dt, horizontal), asked_by(y, motion.y, dt, horizontal)
-    planar, kept = not demands.allow(a, b), True
-    if planar:
+    demands = demands_on((a, b), ahead, pace, walkers, drones, settings, floor=floor)
+    planar, kept = not demands.met, True
+    if demands.ranks is not None:
         wanted = _wanted(wish, pace, demands, dt)
-        safe, kept = nearest(wanted, demands.by_rank(), horizontal.acceleration)
+        safe, kept = nearest(wanted, demands.ranks, horizontal.acceleration)
         a, b = safe
         x = _clip(setpoint_for(a, motion.x, dt, horizontal), settings.lowest[0], settings.highest[0])
         y = _clip(setpoint_for(b, motion.y, dt, horizontal), settings.lowest[1], settings.highest[1])

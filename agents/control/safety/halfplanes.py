@@ -9,6 +9,8 @@ met as far as possible, then the next one within what that leaves. The largest v
 import math
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.vectors import Planar
 
 PARALLEL: Final = 1e-9
@@ -19,6 +21,7 @@ FAR: Final = 1e6
 """Far away compared with any acceleration, m/s^2."""
 
 
+@mypyc_attr(acyclic=True)
 @final
 class HalfPlane:
     """A demand `x a + y b >= least` on a point (a, b), with (x, y) of length one."""

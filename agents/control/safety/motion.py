@@ -2,10 +2,13 @@
 
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 from agents.control.safety.response import LONGEST_LOOK, Axis, Response, observe, start_axis
 from agents.control.vectors import Vector
 
 
+@mypyc_attr(acyclic=True)
 @final
 class Motion:
     """What is known about the own body.

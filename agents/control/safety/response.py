@@ -18,6 +18,8 @@ import math
 from dataclasses import dataclass
 from typing import Final, final
 
+from mypy_extensions import mypyc_attr
+
 OBSERVED_WITHIN: Final = 0.12
 """Time constant with which `rest` is observed, s; twice the lag is added to it."""
 LARGEST_REST: Final = 0.6
@@ -60,6 +62,7 @@ class Response:
         return min(max(asked, -self.acceleration), self.acceleration)
 
 
+@mypyc_attr(acyclic=True)
 @final
 class Axis:
     """What is known about one axis of the own body.
