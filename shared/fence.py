@@ -1,5 +1,6 @@
 """The box that no drone leaves, and what a body in it can do."""
 
+from shared.envelope import envelope_of
 from shared.formation import Formation
 from shared.messages import ORIGIN, Vector
 from shared.plausibility import MotionLimits, body_limits
@@ -32,7 +33,15 @@ def bodies_of(scenario: Scenario, formation: Formation) -> MotionLimits:
     """Returns what the bodies of a swarm can do, for those who hear where they are said to be."""
     low, high = fence_box(scenario, formation)
     fastest = max(scenario.limits.speed, scenario.hand.max_speed, scenario.limits.takeoff_speed)
-    return body_limits(low, high, fastest)
+    envelopes = [envelope_of(scenario, drone) for drone in formation.ids]
+    axes = [axis for envelope in envelopes for axis in (envelope.horizontal, envelope.vertical)]
+    return body_limits(
+        low,
+        high,
+        fastest,
+        acceleration=max(axis.acceleration for axis in axes),
+        lag=max(axis.lag for axis in axes),
+    )
 
 
 def goal_box(scenario: Scenario, formation: Formation) -> Box:

@@ -23,8 +23,10 @@ BODY_SPEED, FALL_SPEED = 5.0, 10.0
 """A small drone that is blown away or falls indoors is no faster, m/s."""
 MARGIN = 4.0
 """Nor is one that follows: it overshoots, and goes faster where it has to catch up or to escape."""
-FURTHEST_AHEAD, AHEAD_SLACK = 1.0, 0.1
-"""A body is looked at no further ahead than this, s, m."""
+LONGEST_LOOK = 0.25
+"""A pose is no older than this when one looks ahead from it, s."""
+AHEAD_SLACK, PACE_SLACK, ASKED_SLACK = 0.1, 0.1, 0.01
+"""How far a point ahead, its pace and its acceleration may be off what a vehicle can do, m, m/s, m/s^2."""
 BEYOND_FENCE = 2.0
 """How far out of the fence a body may get, m: it may be pushed, carried or badly tracked."""
 
@@ -40,6 +42,8 @@ class MotionLimits:
         slack: How far one may seem to move at once, m: noise, and samples that were held up and came together.
         low: Lower corner of where it can be, m.
         high: Upper corner, m.
+        acceleration: Largest that a vehicle can be asked for along any axis, m/s^2.
+        lag: Longest time from what is asked for to what happens, s.
     """
 
     speed: float
@@ -47,19 +51,25 @@ class MotionLimits:
     slack: float
     low: Vector = NOWHERE
     high: Vector = UNBOUNDED
+    acceleration: float = math.inf
+    lag: float = 0.0
 
 
 HAND_LIMITS = MotionLimits(speed=10.0, vertical_speed=10.0, slack=0.3)
 """No reach of an arm is faster. Where a hand may be is up to the mapping, which clamps it."""
 
 
-def body_limits(low: Vector, high: Vector, fastest: float) -> MotionLimits:
+def body_limits(
+    low: Vector, high: Vector, fastest: float, *, acceleration: float = math.inf, lag: float = 0.0
+) -> MotionLimits:
     """Returns what is possible for the body of a drone.
 
     Args:
         low: Lower corner of the fence, m.
         high: Upper corner, m.
         fastest: Largest speed that anybody may be asked to fly at, m/s.
+        acceleration: The same, m/s^2.
+        lag: Longest time from what is asked for to what happens, s.
     """
     (a, b, c), (d, e, f) = low, high
     return MotionLimits(
@@ -68,6 +78,8 @@ def body_limits(low: Vector, high: Vector, fastest: float) -> MotionLimits:
         slack=0.5,
         low=(a - BEYOND_FENCE, b - BEYOND_FENCE, c - BEYOND_FENCE),
         high=(d + BEYOND_FENCE, e + BEYOND_FENCE, f + BEYOND_FENCE),
+        acceleration=acceleration,
+        lag=lag,
     )
 
 
@@ -110,25 +122,50 @@ def check_possible(position: Vector, velocity: Vector, limits: MotionLimits) -> 
         raise DecodeError("too-fast", f"{_said(velocity)} m/s")
 
 
-def check_ahead(position: Vector, velocity: Vector, ahead: Vector, pace: Vector, limits: MotionLimits) -> None:
+def check_ahead(
+    position: Vector, velocity: Vector, ahead: Vector, pace: Vector, asked: Vector, limits: MotionLimits
+) -> None:
     """Refuses a point ahead (docs/safety.md) that is not where a body can be soon, going on as it does.
+
+    Others keep off that point, and the less the faster it says that it goes away, and is asked to.
 
     Args:
         position: Of the body, m.
         velocity: The same, m/s.
         ahead: The point, m.
         pace: Its velocity, m/s.
+        asked: Its acceleration, m/s^2.
         limits: What is possible.
 
     Raises:
-        DecodeError: `outside`, `too-fast` or `unreachable`.
+        DecodeError: `outside`, `too-fast`, `too-hard` or `unreachable`.
     """
     check_possible(ahead, pace, limits)
+    p, q, r = asked
+    if not max(abs(p), abs(q), abs(r)) <= limits.acceleration + ASKED_SLACK:
+        raise DecodeError("too-hard", f"asked for {_said(asked)} m/s^2")
+    a, b, c = velocity
+    u, v, w = pace
+    answer = limits.lag + LONGEST_LOOK
+    if not max(abs(u - a), abs(v - b), abs(w - c)) <= limits.acceleration * answer + PACE_SLACK:
+        raise DecodeError("too-hard", f"at {_said(velocity)}, and soon at {_said(pace)} m/s")
     x, y, z = position
-    a, b, c = ahead
-    u, v, w = velocity
-    if not _length(a - x, b - y, c - z) <= FURTHEST_AHEAD * _length(u, v, w) + AHEAD_SLACK:
+    i, j, k = ahead
+    way = _off_line(i - x, j - y, k - z, velocity, answer)
+    if not way <= AHEAD_SLACK:
         raise DecodeError("unreachable", f"at {_said(position)}, and soon at {_said(ahead)} m")
+
+
+def _off_line(x: float, y: float, z: float, velocity: Vector, longest: float) -> float:
+    """Returns how far a way is from one that leads along a velocity for so long at most, m.
+
+    Across and upwards vehicles answer after times of their own.
+    """
+    u, v, w = velocity
+    square = u * u + v * v
+    across = min(max((x * u + y * v) / square, 0.0), longest) if square > 0.0 else 0.0
+    up = min(max(z / w, 0.0), longest) if w != 0.0 else 0.0
+    return _length(x - across * u, y - across * v, z - up * w)
 
 
 def believe(

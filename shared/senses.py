@@ -211,7 +211,7 @@ class Senses:
             believed = believe(self._believed.get(state.id), state.position, state.velocity, at_ns, bodies)
             check_possible(state.goal, state.goal_velocity, bodies)
             ahead, pace = state.ahead or state.position, state.pace or state.velocity
-            check_ahead(state.position, state.velocity, ahead, pace, bodies)
+            check_ahead(state.position, state.velocity, ahead, pace, state.asked, bodies)
             self._believed[state.id] = believed
         except DecodeError:
             self.doubted_ns[key] = at_ns

@@ -1,6 +1,7 @@
 """`swarmtouch falsify`: flights with faults and weather, their judge, and the search among them."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from agents.agent import Agent
 from agents.vehicles.world.referee import Rules
 from agents.vehicles.world.setup import referee_rules
 from deploy.cli import main
+from deploy.falsify.air import Air, Message
 from deploy.falsify.case import Case, Fault, FaultKind, Stroke, Weather, Wished
 from deploy.falsify.change import change
 from deploy.falsify.draw import FASTEST_HAND, Plan, draw_case
@@ -22,9 +25,12 @@ from deploy.falsify.swarm import Flown, fly, prepare
 from deploy.lockstep.hand_track import relayed
 from deploy.lockstep.lockstep import fly_lockstep
 from deploy.lockstep.record import judge as referee
+from shared.codec import decode, encode
 from shared.envelope import load_envelope
 from shared.errors import ConfigError
-from shared.messages import Wish
+from shared.fence import bodies_of
+from shared.messages import DroneState, Wish
+from shared.plausibility import check_ahead, check_possible
 
 LEFT, RIGHT, REST = (0.0, -0.4, 1.2), (0.0, 0.4, 1.2), (0.0, 0.0, 1.2)
 SWAY = tuple(Stroke(to=to, peak=0.4, rest=0.3) for to in (LEFT, RIGHT) * 9)
@@ -247,6 +253,32 @@ def test_drawn_cases_are_within_what_was_planned() -> None:
     assert max(stroke.peak for case in cases for stroke in case.strokes) <= FASTEST_HAND
     calm = draw_case(Plan(scenarios=("rhombus",), faults=False, weather=False), rng)
     assert (calm.faults, calm.wishes, calm.weather) == ((), (), Weather())
+
+
+@pytest.mark.parametrize("body", ["identified", "crazyflie"])
+def test_what_drones_say_of_themselves_can_be_believed_whatever_happens_to_them(
+    body: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[DroneState] = []
+    publish = Air.publish
+
+    def overheard(air: Air, message: Message, tick: int, agents: Sequence[Agent | None]) -> None:
+        if isinstance(message, DroneState):
+            said.append(message)
+        publish(air, message, tick, agents)
+
+    monkeypatch.setattr(Air, "publish", overheard)
+    plan = Plan(scenarios=("rhombus",), overrides=(f"vehicles.all.body={body}",))
+    case = draw_case(plan, np.random.default_rng(7))
+    fly(case)
+    limits = bodies_of(*prepare(case.scenario, case.overrides))
+    for state in said:
+        assert decode(encode(state), DroneState) == state
+        check_possible(state.goal, state.goal_velocity, limits)
+        assert state.ahead is not None
+        assert state.pace is not None
+        check_ahead(state.position, state.velocity, state.ahead, state.pace, state.asked, limits)
+    assert len(said) > 1000
 
 
 def test_a_case_is_changed_again_and_again_whatever_it_has_become() -> None:

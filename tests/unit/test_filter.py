@@ -292,6 +292,13 @@ def test_who_is_in_the_air_below_another_leaves_it(body: str) -> None:
 
 
 @EVERY_BODY
+def test_nobody_says_that_it_is_asked_for_more_than_its_vehicle_can_do(body: str) -> None:
+    """Who falls fast is demanded more than anybody can; neighbours would not believe a word of it."""
+    drone = Drone(body, (0.0, 0.0, 0.6), (0.0, 0.0, -5.0))
+    assert drone.fly(ORIGIN, []).asked[2] == drone.settings.vertical.acceleration
+
+
+@EVERY_BODY
 def test_who_crosses_above_or_below_is_let_pass(body: str) -> None:
     """More than the height of the downwash apart nobody is in anybody's way."""
     drone = Drone(body, (-1.0, 0.0, 0.5))

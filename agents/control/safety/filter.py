@@ -116,6 +116,8 @@ def guard(
         c = min(max(c, demands.least), demands.most)
         z = _clip(setpoint_for(c, motion.z, dt, vertical), settings.lowest[2], settings.highest[2])
     told = Motion(tell(x, motion.x, dt), tell(y, motion.y, dt), tell(z, motion.z, dt), motion.age)
+    # Of what is demanded beyond what the vehicle can do nobody should be told.
+    c = _clip(c, -vertical.acceleration, vertical.acceleration)
     return Guarded((x, y, z), told, ahead, pace, (a, b, c), planar=planar, upright=upright, kept=kept)
 
 
