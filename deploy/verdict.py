@@ -16,7 +16,9 @@ def contacts(referee: Mapping[str, float]) -> list[str]:
     return [f"{referee[key]:.0f} {text}" for key, text in numbers.items() if referee.get(key)]
 
 
-def absences(followed: Mapping[int, bool], *, heard: bool, asked: bool, rejected: int) -> list[str]:
+def absences(
+    followed: Mapping[int, bool], *, heard: bool, asked: bool, rejected: int, early: bool = False
+) -> list[str]:
     """Says who did not follow a hand that asked for it; where a hand never did, nobody is to blame.
 
     Args:
@@ -24,13 +26,14 @@ def absences(followed: Mapping[int, bool], *, heard: bool, asked: bool, rejected
         heard: Whether there was a hand at all.
         asked: Whether a hand sample with the wish FLY was ever sent.
         rejected: How many poses of the hand the relay refused as impossible.
+        early: Whether it was called off before anybody could be expected to follow.
     """
     if not heard:
         return ["nobody flew: no hand was ever heard; its log is relay.log"]
     if not asked:
         return [f"nobody flew: all poses of the hand are impossible ({rejected}); metres?"] if rejected else []
     absent = [drone for drone, has in followed.items() if not has]
-    if not absent:
+    if not absent or early:
         return []
     return [f"the hand asked, but {_named(absent)} never followed it"]
 

@@ -1,8 +1,12 @@
 """Files from anywhere: as people name them, in whatever encoding, and no more of them than a stated size."""
 
 import codecs
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import unquote
+
+from shared.errors import ConfigError
 
 LARGEST = 1 << 24
 """Bytes of the largest file that is read at once: no configuration of ours is nearly as long."""
@@ -21,6 +25,20 @@ def named(text: str) -> Path:
     """Returns the file or folder of a name, or of the percent-decoded name if only that is there."""
     path, decoded = (Path(name).expanduser() for name in (text, unquote(text)))
     return decoded if not path.exists() and decoded.exists() else path
+
+
+@contextmanager
+def writing(path: Path) -> Generator[None]:
+    """Names a file, or folder, that cannot be written; a full disk says so only as the file is closed.
+
+    Raises:
+        ConfigError: It cannot.
+    """
+    try:
+        yield
+    except OSError as error:
+        where = path if error.filename is None else error.filename
+        raise ConfigError(f"{where}: cannot be written: {error.strerror or error}") from error
 
 
 def encoding_of(head: bytes) -> str:

@@ -1,7 +1,6 @@
 """`swarmtouch glove patterns`: pattern sets listed, shown, compared, drawn and played."""
 
 import argparse
-from pathlib import Path
 
 from deploy.glove.player import play_set
 from deploy.glove.show import list_sets, show_set
@@ -9,6 +8,7 @@ from deploy.glove.svg import draw_svg
 from glove_bridge.gloves.terminal import TerminalGlove
 from glove_bridge.patterns import load_patterns
 from shared.errors import ConfigError
+from shared.files import writing
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -25,14 +25,8 @@ def run(arguments: argparse.Namespace) -> int:
     patterns = load_patterns(arguments.set)
     show_set(patterns, load_patterns(arguments.compare) if arguments.compare else None)
     if arguments.svg:
-        _write(arguments.svg, draw_svg(patterns))
+        with writing(arguments.svg):
+            arguments.svg.write_text(draw_svg(patterns), encoding="utf-8")
     if arguments.play:
         play_set(TerminalGlove(), patterns)
     return 0
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"--svg {path}: cannot be written: {error}") from error

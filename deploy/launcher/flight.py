@@ -60,6 +60,7 @@ class Outcome:
         landed: Whether every drone was on the ground at the end, without an emergency stop.
         stopped: Drones whose motors an emergency stop has cut, wherever they were.
         interrupted: Whether the operator has ended it early.
+        early: Whether that was before a drone could have taken off.
         refused: Processes that refused their configuration.
         simulated: Whether there was a simulated world with a referee.
         referee: What the referee saw; empty if that is unknown.
@@ -72,6 +73,7 @@ class Outcome:
     landed: bool
     stopped: tuple[int, ...]
     interrupted: bool
+    early: bool
     refused: tuple[str, ...]
     simulated: bool
     referee: dict[str, float]
@@ -88,6 +90,7 @@ class Flight:
         files: What processes read when they start, see `Supervisor`.
         seconds: Length of the flight from the first sample of the hand on; None: until the hand ends it.
         landing_speed: How fast drones descend, m/s.
+        takeoff_s: How long a take-off takes, s.
         view: Where to show it.
     """
 
@@ -101,6 +104,7 @@ class Flight:
         files: Mapping[Path, str],
         seconds: float | None,
         landing_speed: float,
+        takeoff_s: float,
         view: View,
     ) -> None:
         self.formation = formation
@@ -117,6 +121,9 @@ class Flight:
         self._rows = rows
         self._left_s = math.inf if seconds is None else seconds
         self._landing_speed = landing_speed
+        self._takeoff_s = takeoff_s
+        self._hand_since = math.inf
+        self._is_early = False
         self._view = view
         self._keyboard = Keyboard(self._key)
         self._interrupts = 0
@@ -157,6 +164,7 @@ class Flight:
                 self.supervisor.start(row)
         # The length of the flight counts from here: a busy machine takes its time to start a relay.
         await self._until(lambda: self.monitor.stats.hand is not None or self._is_called_off, HAND_S)
+        self._hand_since = time.monotonic()
         await self._follow_hand()
         while self._stop_asked and not self._cut_short:
             await self._pause()
@@ -237,6 +245,7 @@ class Flight:
             landed=landed,
             stopped=self.monitor.stopped,
             interrupted=self._interrupts > 0,
+            early=self._is_early,
             refused=self._refused(),
             simulated=any(row.role == WORLD for row in self._rows),
             referee=self._read_referee(),
@@ -255,6 +264,8 @@ class Flight:
         return report
 
     def _interrupt(self) -> None:
+        if not self._interrupts:
+            self._is_early = time.monotonic() < self._hand_since + self._takeoff_s + SETTLING_S
         self._interrupts += 1
 
     def _ask_stop(self) -> None:

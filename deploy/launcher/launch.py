@@ -178,6 +178,7 @@ async def _fly(
             files=_texts(run_dir / SCENARIO_FILE, run_dir / PATTERN_FILE),
             seconds=options.seconds,
             landing_speed=scenario.limits.landing_speed,
+            takeoff_s=scenario.limits.takeoff_height / scenario.limits.takeoff_speed,
             view=view,
         )
         outcome = await flight.run()

@@ -91,7 +91,7 @@ def _faults(outcome: Outcome, followed: Mapping[int, bool], hand: Json, *, heard
     return [
         *(f"{name} ended unexpectedly ({', '.join(map(exit_word, codes))})" for name, codes in exits.items()),
         *(f"{name} could not be started ({count} times)" for name, count in failures.items()),
-        *absences(followed, heard=heard, asked=hand["asked"], rejected=hand["rejected"]),
+        *absences(followed, heard=heard, asked=hand["asked"], rejected=hand["rejected"], early=outcome.early),
         *contacts(outcome.referee),
         *(["what the referee saw is unknown"] if outcome.simulated and not outcome.referee else []),
         *landing(outcome.stopped, landed=outcome.landed),

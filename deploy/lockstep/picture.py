@@ -10,6 +10,7 @@ from observer.colours import COLOURS, HAND, drone_colour
 from shared.cylinders import columns_of
 from shared.errors import ConfigError
 from shared.fence import fence_box
+from shared.files import writing
 from shared.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -25,10 +26,10 @@ def draw(record: Record, scenario: Scenario, path: Path) -> None:
     Args:
         record: The run.
         scenario: What was flown.
-        path: Where to write; the suffix chooses the format (`.png`, `.svg`, `.pdf`).
+        path: Where to write; the suffix chooses the format (`.png`, `.svg`, `.pdf`), without one it is PNG.
 
     Raises:
-        ConfigError: matplotlib is not installed, or it does not know the format.
+        ConfigError: matplotlib is not installed, it does not know the format, or the file cannot be written.
     """
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415  an optional extra, and slow to import
@@ -42,7 +43,9 @@ def draw(record: Record, scenario: Scenario, path: Path) -> None:
         _draw_formation(axes, record, tick, strength=0.3 + 0.7 * tick / len(record.hand.t))
     _frame(axes, record, scenario)
     try:
-        figure.savefig(path, dpi=110)
+        # Left to itself matplotlib writes to a file of another name where there is no suffix.
+        with writing(path):
+            figure.savefig(path, dpi=110, format=path.suffix[1:] or "png")
     except ValueError as error:
         raise ConfigError(f"--plot {path}: {error}") from error
 

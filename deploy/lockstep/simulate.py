@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from deploy.verdict import absences, contacts
 from human_relay.sources import plays_by_itself, source_hints, source_remarks
 from shared.compiled import form
 from shared.errors import ConfigError
+from shared.files import writing
 from shared.messages import HandSample, Wish
 from shared.scenario import Scenario
 from shared.scenario_check.check import open_scenario
@@ -56,7 +58,8 @@ def simulate(options: Options) -> dict[str, Any]:
     Returns:
         The summary: ok, faults (sentences), drones, followed (how many ever did), asked (whether the hand ever
         wished that they fly), without_hand (samples without a possible pose), seconds, realtime_factor, the
-        referee's distances and counts, tracking_rms_m, remarks (what was left out of the hand, and why).
+        referee's distances and counts, tracking_rms_m, remarks (what was left out of the hand, and why, and
+        how often it jumped).
 
     Raises:
         ConfigError: The scenario or the hand is refused, or a plot cannot be made.
@@ -74,10 +77,18 @@ def simulate(options: Options) -> dict[str, Any]:
         record = fly(scenario, formation, samples)
     took_s = time.perf_counter() - started
     if options.csv:
-        write_csv(record, options.csv)
+        with writing(options.csv):
+            write_csv(record, options.csv)
     if options.plot:
         draw(record, scenario, options.plot)
-    return {**_summary(record, scenario, samples, took_s), "remarks": list(source_remarks(options.hand))}
+    remarks = [*source_remarks(options.hand), *_jumped(samples)]
+    return {**_summary(record, scenario, samples, took_s), "remarks": remarks}
+
+
+def _jumped(samples: Sequence[HandSample]) -> list[str]:
+    jumps = sum(after.jumped and not before.jumped for before, after in pairwise(samples))
+    times = "once" if jumps == 1 else f"{jumps} times"
+    return [f"the hand jumped {times}, further than a hand can: it held, and was walked to"] if jumps else []
 
 
 def _summary(

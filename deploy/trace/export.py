@@ -6,6 +6,7 @@ from observer.trace.foxglove import export_foxglove
 from observer.trace.read import open_trace
 from observer.trace.tables import export_csv
 from shared.errors import ConfigError
+from shared.files import writing
 
 
 def main(*, run: Path, foxglove: Path | None, csv: Path | None) -> int:
@@ -16,18 +17,17 @@ def main(*, run: Path, foxglove: Path | None, csv: Path | None) -> int:
     if foxglove is not None and any(foxglove.resolve() == file.resolve() for file in trace.files):
         raise ConfigError(f"--foxglove {foxglove}: that is the trace itself; name another file")
     written = 0
-    try:
-        if foxglove is not None:
+    if foxglove is not None:
+        with writing(foxglove):
             written = export_foxglove(trace, foxglove)
-            print(f"{foxglove}: {written} messages")
-        if csv is not None:
+        print(f"{foxglove}: {written} messages")
+    if csv is not None:
+        with writing(csv):
             tables, left_out = export_csv(trace, csv)
-            written += len(tables) - 1
-            print(f"{csv}: {len(tables)} tables")
-            if left_out:
-                print(f"{csv}: {left_out} or more columns that somebody made up were left out")
-    except OSError as error:
-        raise ConfigError(f"the export cannot be written: {error}") from error
+        written += len(tables) - 1
+        print(f"{csv}: {len(tables)} tables")
+        if left_out:
+            print(f"{csv}: {left_out} or more columns that somebody made up were left out")
     for fault in trace.faults:
         print(f"{run}: {fault}")
     if rejected := sum(trace.rejected.values()):

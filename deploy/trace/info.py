@@ -25,6 +25,9 @@ from shared.process import prepare_process
 from shared.topics import TOPICS
 
 _PERIOD_S = 0.5
+_HOUR_NS = 3600 * NS_PER_S
+_MOST_HOURS = 1000
+"""Of so many different hours a trace is looked at."""
 _WIDTH = 110
 """Where there is no terminal to fit into."""
 _COLUMNS = (
@@ -42,9 +45,10 @@ def main(*, run: str | None, live: bool, links: bool, seconds: float | None, as_
         swarm, now_ns = _hear(run, seconds, console, everybody=links)
     else:
         trace = open_trace(run)
-        swarm, begin_ns, now_ns = _read(trace)
+        swarm, times = _read(trace)
+        begin_ns, now_ns, elsewhere = times.span()
         if not as_json:
-            print_lines(console, _describe(trace, (now_ns - begin_ns) / NS_PER_S))
+            print_lines(console, _describe(trace, (now_ns - begin_ns) / NS_PER_S, elsewhere))
     rows = _chosen(swarm, everybody=links)
     if as_json:
         for row in rows:
@@ -82,7 +86,7 @@ def link_table(rows: Iterable[LinkSummary], swarm: SwarmLinks, now_ns: int) -> T
             str(row.late),
             _ms(row.age_ms.p50),
             _ms(row.age_ms.p99),
-            f"{(now_ns - row.last_ns) / NS_PER_S:.1f}" if row.last_ns else "-",
+            f"{max(0, now_ns - row.last_ns) / NS_PER_S:.1f}" if row.last_ns else "-",
             refused,
         )
     return table
@@ -103,13 +107,41 @@ def print_lines(console: Console, lines: Iterable[str]) -> None:
         console.print(line, soft_wrap=True)
 
 
-def _read(trace: Trace) -> tuple[SwarmLinks, int, int]:
-    """Returns the links and the time of the first and the last record, ns."""
-    swarm, begin_ns, end_ns = SwarmLinks(), 0, 0
+class _Times:
+    """When most of what is in a trace came: a damaged stamp may be centuries off."""
+
+    def __init__(self) -> None:
+        self._hours: dict[int, tuple[int, int, int]] = {}
+        self._count = 0
+
+    def add(self, log_ns: int) -> None:
+        """Takes in when something came, ns."""
+        self._count += 1
+        hour = log_ns // _HOUR_NS
+        if hour in self._hours or len(self._hours) < _MOST_HOURS:
+            count, first_ns, last_ns = self._hours.get(hour, (0, log_ns, log_ns))
+            self._hours[hour] = (count + 1, min(first_ns, log_ns), max(last_ns, log_ns))
+
+    def span(self) -> tuple[int, int, int]:
+        """Returns first and last time about the fullest hour, ns, and how many came in no hour next to it."""
+        if not self._hours:
+            return 0, 0, 0
+        low = high = max(self._hours, key=lambda hour: self._hours[hour][0])
+        while low - 1 in self._hours:
+            low -= 1
+        while high + 1 in self._hours:
+            high += 1
+        within = sum(self._hours[hour][0] for hour in range(low, high + 1))
+        return self._hours[low][1], self._hours[high][2], self._count - within
+
+
+def _read(trace: Trace) -> tuple[SwarmLinks, _Times]:
+    """Returns the links, and when what is there came."""
+    swarm, times = SwarmLinks(), _Times()
     for record in trace.records():
         take(swarm, record.key, record.payload, record.log_ns)
-        begin_ns, end_ns = begin_ns or record.log_ns, max(end_ns, record.log_ns)
-    return swarm, begin_ns, end_ns
+        times.add(record.log_ns)
+    return swarm, times
 
 
 def _hear(
@@ -134,13 +166,14 @@ def _chosen(swarm: SwarmLinks, *, everybody: bool) -> list[LinkSummary]:
     return [row for row in swarm.rows() if everybody or row.listener == OBSERVER]
 
 
-def _describe(trace: Trace, seconds: float) -> list[str]:
+def _describe(trace: Trace, seconds: float, elsewhere: int) -> list[str]:
     host, versions = trace.metadata.get("host", {}), trace.metadata.get("versions", {})
     return [
         *(f"{file}: {file.stat().st_size / 1e6:.1f} MB" for file in trace.files),
         f"swarm {trace.scenario.swarm.name}, {seconds:.1f} s, recorded on {host.get('name', '?')}"
         f" by swarmtouch {versions.get('swarmtouch', '?')}",
         *trace.faults,
+        *([f"{elsewhere} messages came at a time that is hours away from all others"] if elsewhere else []),
     ]
 
 

@@ -16,7 +16,7 @@ from observer.path.hop import GLOVE_NODE, Effect, HandPath, Hop, Part
 from observer.path.perfetto import chrome_trace
 from observer.trace.read import open_trace
 from shared.clock import NS_PER_S
-from shared.errors import ConfigError
+from shared.files import writing
 from shared.formation import build_formation
 
 _WIDTH = 110
@@ -108,8 +108,6 @@ def _clock(stamp_ns: int) -> str:
 
 
 def _write(path: Path, text: str, console: Console) -> None:
-    try:
+    with writing(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error}") from error
     console.print(str(path))

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shared.errors import ConfigError
+from shared.files import writing
 from shared.plain_text import plain
 
 
@@ -18,10 +19,8 @@ def main(*, runs: Sequence[Path], output: Path) -> int:
             f"trace report needs {error.name}: install the extra, for example pip install 'swarmtouch[plot]'"
         ) from error
     flights = [open_record(run) for run in runs]
-    try:
+    with writing(output):
         page = write_report(flights, output)
-    except OSError as error:
-        raise ConfigError(f"-o {output}: the report cannot be written there: {error}") from error
     print(page)
     for remark in remarks(flights):
         print(plain(remark))

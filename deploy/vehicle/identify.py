@@ -12,6 +12,7 @@ from shared.arrays import Vec
 from shared.config import structure
 from shared.envelope import Envelope
 from shared.errors import ConfigError
+from shared.files import writing
 from shared.toml_text import parse_toml
 
 MOVED = 0.05
@@ -26,7 +27,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.output is None:
         print(text, end="")
     else:
-        Path(arguments.output).write_text(text, encoding="utf-8")
+        path = Path(arguments.output)
+        with writing(path):
+            path.write_text(text, encoding="utf-8")
     return 0
 
 

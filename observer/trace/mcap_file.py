@@ -173,6 +173,12 @@ class McapFile:
         return True
 
 
+def begins_as_mcap(path: Path) -> bool:
+    """Says whether a file begins as every MCAP file does; raises `OSError`."""
+    with path.open("rb") as stream:
+        return stream.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
+
+
 def open_chunk(content: bytes) -> Iterator[tuple[int, bytes]]:
     """Yields kind and content of every record in a chunk, bit by bit: a replay has no time for a whole one.
 

@@ -211,6 +211,8 @@ def _scenario(
     if beside.is_file():
         fault = f"{why}; that of {SCENARIO_FILE} beside it is taken"
         return surveys[0].metadata, _structured(read_toml(beside), beside), fault
+    if not any(map(mcap_file.begins_as_mcap, files)):
+        why = "it is no MCAP file" if files[0].stat().st_size else "it is empty"
     raise ConfigError(f"{files[0]}: not a trace of a swarm: {why}")
 
 

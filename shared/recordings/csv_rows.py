@@ -1,12 +1,14 @@
 """Rows of CSV files, plain or gzipped, in any encoding, and no more of them than a stated number.
 
 Cells are separated by commas, semicolons or tabs: whatever separates the most in the first line, or what a
-line `sep=;` before it says, as spreadsheets write it.
+line `sep=;` before it says, as spreadsheets write it. Lines that begin with `#` are comments; right before
+numbers one is the header, as NumPy writes it.
 """
 
 import csv
 import gzip
 import io
+import re
 import zlib
 from collections.abc import Generator, Iterator
 from contextlib import ExitStack
@@ -25,6 +27,8 @@ LONGEST_LINE = 1 << 16
 
 _SEPARATORS = ",;\t"
 _SAID = "sep="
+_COMMENT = "#"
+_NUMBERS = re.compile(r"[\d\s.,;+\-eE\"]+")
 
 _GZIP = b"\x1f\x8b"
 
@@ -55,9 +59,9 @@ class CsvRows:
         try:
             with ExitStack() as files:
                 lines = self._lines(_open(files, self._path))
-                head = list(_head(lines))
-                self.separator, is_said = _separator(head[-1] if head else "")
-                reader = csv.reader(chain(head, lines), delimiter=self.separator)
+                head, names = _head(lines)
+                self.separator, is_said = _separator(names)
+                reader = csv.reader(chain(head, map(_uncommented, lines)), delimiter=self.separator)
                 for cells in reader:
                     begin, end = end + 1, reader.line_num
                     if any(cells) and not (is_said and end == len(head)):
@@ -91,12 +95,31 @@ class CsvRows:
             yield line
 
 
-def _head(lines: Iterator[str]) -> Iterator[str]:
-    """Yields lines to the first that is not blank."""
+def _head(lines: Iterator[str]) -> tuple[list[str], str]:
+    """Reads to the first line that is neither blank nor a comment.
+
+    Returns:
+        As many lines as were read, comments blanked, and that one of them that is to name the columns.
+    """
+    head, comment = list[str](), -1
     for line in lines:
-        yield line
-        if line.strip():
-            return
+        head.append(line)
+        if line.startswith(_COMMENT):
+            comment = len(head) - 1
+        elif line.strip():
+            break
+    if not head:
+        return [], ""
+    named = head[comment].removeprefix(_COMMENT) if comment >= 0 and _NUMBERS.fullmatch(head[-1]) else ""
+    head = [_uncommented(line) for line in head]
+    if named:
+        head[comment] = named
+    return head, named or head[-1]
+
+
+def _uncommented(line: str) -> str:
+    """Blanks a comment: lines keep their numbers."""
+    return "\n" if line.startswith(_COMMENT) else line
 
 
 def _separator(line: str) -> tuple[str, bool]:

@@ -2,7 +2,7 @@
 
 import sys
 from array import array
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +17,8 @@ _LONGEST_STAMP = 19
 """Digits of the largest 64 bit integer."""
 _LONGEST_SHOWN = 40
 """Characters of a wrong cell that are shown."""
+_BRACKETS = (("[", "]"), ("(", ")"))
+_NO_UNITS: Mapping[str, str] = {}
 LONGEST_TEXT = 200
 """Characters of a cell that is kept as text."""
 
@@ -45,9 +47,12 @@ def read_table(
     integers: Sequence[str] = (),
     numbers: Sequence[str] = (),
     texts: Sequence[str] = (),
+    units: Mapping[str, str] = _NO_UNITS,
     most: int = MOST_LINES,
 ) -> Table:
     """Reads named columns of a CSV file with a header; other columns and empty lines are ignored.
+
+    A column may be named in capitals, and with its unit: `X [m]` is `x`.
 
     Blank cells are none of the reader's business: a tracker writes them for what it has lost. A file that
     was cut off ends with its last whole line.
@@ -57,6 +62,7 @@ def read_table(
         integers: Columns of nanosecond stamps, whole numbers (they lose digits as floats).
         numbers: Columns of numbers.
         texts: Columns of text.
+        units: Of columns, in case the header says a unit: another one is refused.
         most: Lines at most.
 
     Raises:
@@ -66,6 +72,8 @@ def read_table(
     rows = CsvRows(path, most)
     with closing(iter(rows)) as content:
         _, header = next(content, (0, []))
+        for name, unit in units.items():
+            _check_unit(path, header, name, unit)
         columns = _Columns(path, header, integers, numbers, texts)
         columns.has_decimal_commas = rows.separator != ","
         for line, cells in content:
@@ -77,7 +85,7 @@ def read_table(
 
 
 def read_header(path: Path) -> list[str]:
-    """Reads the names of the columns.
+    """Reads the names of the columns, in small letters and without units.
 
     Raises:
         ConfigError: The file is missing, unreadable or empty.
@@ -85,7 +93,7 @@ def read_header(path: Path) -> list[str]:
     with closing(iter(CsvRows(path, MOST_LINES))) as content:
         _, header = next(content, (0, []))
     _places(path, header, ())
-    return header
+    return [_parted(cell)[0] for cell in header]
 
 
 class _Columns:
@@ -145,15 +153,38 @@ class _Columns:
 def _places(path: Path, header: list[str], wanted: Sequence[str]) -> list[int]:
     if not header:
         raise ConfigError(f"{path}: empty; expected a header and rows")
-    missing = [name for name in wanted if name not in header]
-    if missing:
+    found = {name: _columns_of(name, header) for name in wanted}
+    if missing := [name for name, places in found.items() if not places]:
         raise ConfigError(
             f"{path}: no column {', '.join(missing)}; expected the header {','.join(wanted)}, "
             f"found {','.join(header)[:LONGEST_TEXT]}"
         )
-    if twice := [name for name in wanted if header.count(name) > 1]:
+    if twice := [name for name, places in found.items() if len(places) > 1]:
         raise ConfigError(f"{path}: more than one column {', '.join(twice)}; rename the others")
-    return [header.index(name) for name in wanted]
+    return [places[0] for places in found.values()]
+
+
+def _columns_of(name: str, header: list[str]) -> list[int]:
+    """Returns where a column of this very name is, or else of one like it."""
+    same = [place for place, cell in enumerate(header) if cell == name]
+    return same or [place for place, cell in enumerate(header) if _parted(cell)[0] == name]
+
+
+def _check_unit(path: Path, header: list[str], name: str, unit: str) -> None:
+    for place in _columns_of(name, header):
+        said = _parted(header[place])[1]
+        if said not in ("", unit):
+            raise ConfigError(f"{path}: column {header[place][:_LONGEST_SHOWN]}: write {name} in {unit}")
+
+
+def _parted(cell: str) -> tuple[str, str]:
+    """Takes the name of a column, in small letters, and its unit, in brackets behind it or empty, apart."""
+    text = cell.lower()
+    for left, right in _BRACKETS:
+        name, begun, unit = text.removesuffix(right).partition(left)
+        if begun and text.endswith(right):
+            return name.strip(), unit.strip()
+    return text, ""
 
 
 def _stamp(text: str) -> int:

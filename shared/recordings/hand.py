@@ -20,6 +20,9 @@ LATEST_S = 4e9
 MOST_YAW = 4.0 * np.pi
 """Largest heading in a table, rad: nobody turns on the spot twice, and degrees are soon more."""
 
+UNITS = {"t": "s", "x": "m", "y": "m", "z": "m", "yaw": "rad"}
+"""Of the columns of a table."""
+
 _BAG = b"#ROSBAG V"
 _MOST_NAMED = 20
 _ROS2_FILE = "metadata.yaml"
@@ -86,7 +89,8 @@ def read_csv(path: Path) -> Found:
         ConfigError: Names the file and the line.
     """
     has_yaw = "yaw" in read_header(path)
-    table = read_table(path, numbers=("t", "x", "y", "z", *(("yaw",) if has_yaw else ())))
+    numbers = ("t", "x", "y", "z", *(("yaw",) if has_yaw else ()))
+    table = read_table(path, numbers=numbers, units=UNITS)
     t, half_yaw = table.numbers[:, 0], table.numbers[:, 4] / 2 if has_yaw else None
     said = np.abs(t) <= LATEST_S
     if 2 * np.count_nonzero(said) < np.count_nonzero(np.isfinite(t)):

@@ -42,6 +42,7 @@ _OUTCOME = Outcome(
     landed=True,
     stopped=(),
     interrupted=False,
+    early=False,
     simulated=False,
     refused=(),
     referee={},

@@ -84,8 +84,33 @@ def test_a_table_of_any_spreadsheet_is_read(tmp_path: Path, separator: str, comm
 
 
 @pytest.mark.parametrize(
+    "head", ["T,X,Y,Z", "t [s],x (m),Y[M],z", "# me\n\n#\nt,x,y,z", "# t,x,y,z", "#,t,x,y,z"]
+)
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_a_header_may_have_capitals_units_and_comments(tmp_path: Path, head: str, separator: str) -> None:
+    row = "{},0.5,-0.1,1.25" if head != "#,t,x,y,z" else "7,{},0.5,-0.1,1.25"
+    rows = [row.format(k / 64) for k in range(60)]
+    rows[30:30] = ["# a comment, with commas"]
+    text = "\n".join((*head.split("\n"), *rows)) + "\n"
+    path = tmp_path / "take.csv"
+    path.write_text(text if separator == "," else text.replace(",", ";").replace(".", ","))
+    hand = read_hand(path)
+    assert hand.remarks == ()
+    assert np.allclose(hand.checked.track.position, [0.5, -0.1, 1.25])
+    with path.open("a") as stream:
+        stream.write(rows[-1].replace(",", separator).replace("1", "oops") + "\n")
+    lines = len(path.read_text().splitlines())
+    with pytest.raises(ConfigError, match=f"line {lines}: "):
+        read_hand(path)
+
+
+@pytest.mark.parametrize(
     ("data", "why"),
     [
+        (b"t,x [mm],y,z\n0,0,0,1\n", "column x [mm]: write x in m"),
+        (b"T (ms),x,y,z\n0,0,0,1\n", "column T (ms): write t in s"),
+        (b"t,X,x [m],y,z\n0,0,0,0,1\n", "more than one column x"),
+        (b"# only words\n", "empty; expected a header"),
         (b"BZh91AY&SY", "packed by bzip2; a hand is read from"),
         (b"\xfd7zXZ\0\0\4", "packed by xz"),
         (b"\x02P\0\0", "a C3D file"),

@@ -92,6 +92,7 @@ def outcome(**changes: object) -> Outcome:
         "landed": True,
         "stopped": (),
         "interrupted": False,
+        "early": False,
         "refused": (),
         "simulated": True,
         "referee": REFEREE,
@@ -269,6 +270,14 @@ def test_one_number_out_of_the_future_does_not_end_the_statistics() -> None:
     assert monitor.stats.hand == hand()
     assert monitor.stats.agents()[0].steps == 2
     assert monitor.rejected == {"ahead": 2}
+
+
+def test_who_is_called_off_before_it_can_have_taken_off_is_not_to_blame() -> None:
+    monitor = Swarm().say(hand(), state(1, Mode.TAKEOFF))
+    summary = flight_summary(outcome(interrupted=True, early=True), monitor)
+    assert (summary["ok"], summary["faults"]) == (True, [])
+    summary = flight_summary(outcome(interrupted=True), monitor)
+    assert "never followed it" in summary["faults"][0]
 
 
 def test_presence_is_followed() -> None:

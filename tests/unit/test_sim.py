@@ -86,6 +86,28 @@ def test_what_was_left_out_of_a_recorded_hand_is_in_the_summary(
     assert said in output.err
 
 
+def test_a_hand_that_jumps_says_why_it_was_not_followed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [f"{k / 60},{0.0 if k < 60 else 1.5},0,1.2" for k in range(120)]
+    hand = f"{recording(tmp_path, rows)}?lead=0"
+    main(["sim", "rhombus", "--hand", hand, "--seconds", "2", "--json"])
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["without_hand"] > 0
+    assert summary["remarks"] == ["the hand jumped once, further than a hand can: it held, and was walked to"]
+
+
+@pytest.mark.parametrize("option", ["--csv", "--plot"])
+def test_a_full_disk_is_named_with_the_file(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sim", "rhombus", "--seconds", "0.5", option, "/dev/full"]) == 2
+    assert "/dev/full: cannot be written: No space left on device" in capsys.readouterr().err
+
+
+def test_a_picture_gets_the_name_that_was_asked_for(tmp_path: Path) -> None:
+    assert main(["sim", "rhombus", "--seconds", "0.5", "--plot", str(tmp_path / "flight")]) == 0
+    assert (tmp_path / "flight").read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize("law", ["paper", "central"])
 def test_a_flight_in_which_nobody_flew_is_not_ok(
     law: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -1,5 +1,6 @@
 """Traces: what is written comes back byte by byte, whole or damaged, and describes itself."""
 
+import gzip
 import json
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import MCAP0_MAGIC
 
 from observer.trace.layout import trace_files
 from observer.trace.order import Record
@@ -176,9 +178,15 @@ def test_what_is_no_trace_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no trace; record one with swarmtouch up --record"):
         open_trace(tmp_path)
     file = tmp_path / "other.mcap"
-    file.write_bytes(b"nonsense")
-    with pytest.raises(ConfigError, match="not a trace of a swarm"):
-        open_trace(file)
+    for content, why in (
+        (b"nonsense", "it is no MCAP file"),
+        (gzip.compress(MCAP0_MAGIC), "it is no MCAP file"),
+        (b"", "it is empty"),
+        (2 * MCAP0_MAGIC, "it holds no scenario"),
+    ):
+        file.write_bytes(content)
+        with pytest.raises(ConfigError, match=f"not a trace of a swarm: {why}"):
+            open_trace(file)
     with pytest.raises(ConfigError, match="no trace can be written"):
         TraceWriter(file / "below", SCENARIO)
 

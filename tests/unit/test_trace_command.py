@@ -7,11 +7,13 @@ import pytest
 
 from deploy.cli import main
 from deploy.trace.echo import line
+from observer.trace.write import TraceWriter
+from shared.clock import NS_PER_S
 from shared.codec import encode
 from shared.messages import ProcessStatus
 from shared.topics import HAND, STATUS
 from shared.transport import Arrival
-from tests.traces import START_NS, flight, hand, write
+from tests.traces import SCENARIO, START_NS, flight, hand, write
 
 HEALTH = ProcessStatus(
     epoch=1,
@@ -56,6 +58,20 @@ def test_info_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         ("drone/2/state", 100, 0),
     ]
     assert rows[0]["rejected"] == {"malformed": 1}
+
+
+@pytest.mark.parametrize("far_ns", [0, 2**63])
+def test_info_measures_a_flight_by_what_came_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], far_ns: int
+) -> None:
+    writer = TraceWriter(tmp_path, SCENARIO)
+    for seq in range(120):
+        at_ns = far_ns if seq in (0, 77) else START_NS + seq * NS_PER_S // 60
+        writer.add(HAND.key(), Arrival(encode(hand(seq)), at_ns))
+    writer.close(dropped=0)
+    output = output_of(capsys, "info", str(tmp_path))
+    assert "swarm rhombus, 2.0 s" in output
+    assert "2 messages came at a time that is hours away from all others" in output
 
 
 def test_info_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
