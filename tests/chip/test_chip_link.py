@@ -26,7 +26,7 @@ from glove_bridge.protocol import (
 from tests.chip.asker import Asker
 from tests.chip.simulated_chip import SimulatedChip
 
-pytestmark = pytest.mark.chip
+pytestmark = [pytest.mark.chip, pytest.mark.parallel]
 
 REST = (0,) * 5
 ALL = (90, 100, 110, 120, 130)

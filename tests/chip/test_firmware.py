@@ -27,6 +27,7 @@ def compiler() -> str | None:
 
 pytestmark = [
     pytest.mark.chip,
+    pytest.mark.parallel,
     pytest.mark.skipif(compiler() not in (None, COMPILER), reason=f"avr-gcc is not {COMPILER}"),
 ]
 

@@ -15,7 +15,7 @@ from glove_bridge.protocol import PlayFrame
 from glove_bridge.session import Session
 from tests.chip.simulated_chip import SimulatedChip
 
-pytestmark = [pytest.mark.chip, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.chip, pytest.mark.parallel, pytest.mark.timeout(400)]
 
 PATTERNS = 500
 FRAME_MS = 30

@@ -17,7 +17,7 @@ from glove_bridge.protocol import Set
 from tests.chip.asker import Asker
 from tests.chip.simulated_chip import SimulatedChip
 
-pytestmark = pytest.mark.chip
+pytestmark = [pytest.mark.chip, pytest.mark.parallel]
 
 FRAME_MS = 2.0
 """How far a frame may be from its length."""

@@ -12,7 +12,7 @@ from glove_bridge.calibration_file import load_calibration
 from glove_bridge.protocol import PROTOCOL
 from tests.chip.simulated_chip import SimulatedChip
 
-pytestmark = pytest.mark.chip
+pytestmark = [pytest.mark.chip, pytest.mark.parallel]
 
 OFF = (0,) * 5
 
