@@ -1,84 +1,73 @@
-"""A drone that lies within the limits of a body drives the others before it, but not into each other."""
+"""One member of a flying swarm lies about itself: the others neither follow nor flee, and say so."""
 
 import math
-from collections.abc import Sequence
-from itertools import combinations
+from collections.abc import Callable
 
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from deploy.falsify.air import Air, Message
-from deploy.falsify.draw import Plan, draw_case
-from deploy.falsify.swarm import fly, prepare
-from shared.fence import fence_box
-from shared.messages import DroneState, Mode, Vector
+from deploy.lockstep.lockstep import Lockstep
+from deploy.lockstep.start import start_flyers
+from shared.config import load_scenario
+from shared.formation import build_formation
+from shared.messages import DroneState, Flag, HandSample, Mode, Places
+from tests.hands import REST, still
 
-LIAR, HONEST = 4, (1, 2, 3)
-BEGIN, CASES = 400, 4
-SPEEDS = (0.0, 0.5, 1.0, 2.0, 4.9)
-FLYING = 0.15
-"""Who is lower stands or lands, m."""
+BEGIN, END, LENGTH = 120, 420, 720
+"""Ticks of 1/60 s: when it begins to lie, when it tells the truth again, and the whole flight."""
 
-
-class Liar:
-    """Says that it chases one after the other, as fast as anybody is believed, and hears nobody."""
-
-    def __init__(self, seed: int) -> None:
-        self._rng = np.random.default_rng(seed)
-        self._places: dict[int, Vector] = {}
-        self._target, self._speed, self._left = 1, 0.0, 0
-
-    def hear(self, state: DroneState) -> None:
-        if state.id != LIAR or LIAR not in self._places:
-            self._places[state.id] = state.position
-
-    def lie(self, state: DroneState) -> DroneState:
-        if not self._left:
-            self._left = int(self._rng.integers(5, 60))
-            self._target = int(self._rng.choice(HONEST))
-            self._speed = float(self._rng.choice(SPEEDS))
-        self._left -= 1
-        own, there = self._places[LIAR], self._places[self._target]
-        share = self._speed / max(math.dist(own, there), self._speed / 60.0, 1e-9)
-        x, y, z = (share * (b - a) for a, b in zip(own, there, strict=True))
-        a, b, c = own
-        self._places[LIAR] = a + x / 60.0, b + y / 60.0, c + z / 60.0
-        return replace(
-            state,
-            position=self._places[LIAR],
-            velocity=(x, y, z),
-            ahead=None,
-            pace=None,
-            unheard=HONEST,
-            mode=Mode.FOLLOW,
-        )
+Lie = Callable[[DroneState, int], DroneState]
+LIES: dict[str, Lie] = {
+    "far away": lambda said, _: replace(said, position=(0.0, 60.0, 1.2)),
+    "at the speed of a bullet": lambda said, _: replace(said, velocity=(0.0, 50.0, 0.0)),
+    "wants to go far away": lambda said, _: replace(said, goal=(900.0, 0.0, 1.2)),
+    "going away harder than anybody can": lambda said, _: replace(said, asked=(-45.0, 0.0, 0.0)),
+    "to and fro over the others": lambda said, tick: replace(
+        said, position=(said.position[0] + (-9.0 if tick % 2 else 9.0), *said.position[1:])
+    ),
+}
 
 
-@pytest.mark.parametrize("body", ["identified", "crazyflie"])
-def test_a_liar_drives_nobody_into_another_or_out_of_the_fence(
-    body: str, monkeypatch: pytest.MonkeyPatch
+class Lying(Lockstep):
+    """A swarm in lockstep of which one says something else than is."""
+
+    liar: int
+    lie: Lie | None
+
+    def _publish(self, key: str, message: HandSample | DroneState | Places, now_ns: int) -> None:
+        if (
+            isinstance(message, DroneState)
+            and message.id == self.liar
+            and BEGIN <= self.tick < END
+            and self.lie
+        ):
+            message = self.lie(message, self.tick)
+        super()._publish(key, message, now_ns)
+
+
+def fly(lie: Lie | None, liar: int, law: str) -> list[list[DroneState]]:
+    """Flies a hand that rests; returns what everybody really did, tick by tick."""
+    scenario = load_scenario("rhombus", [f"swarm.law={law}"])
+    formation = build_formation(scenario)
+    bodies = start_flyers(scenario, formation, (REST + formation.rest).tolist(), airborne=True)
+    swarm = Lying(scenario, formation, bodies)
+    swarm.liar, swarm.lie = liar, lie
+    return [swarm.advance(sample) for sample in still(LENGTH / 60.0)]
+
+
+@pytest.mark.parametrize("law", ["paper", "stable"])
+@pytest.mark.parametrize("liar", [1, 4], ids=["whom two follow", "whom nobody follows"])
+@pytest.mark.parametrize("lie", LIES)
+def test_a_liar_moves_nobody_and_is_believed_again_when_it_tells_the_truth(
+    lie: str, liar: int, law: str
 ) -> None:
-    publish = Air.publish
-    liar = Liar(0)
-
-    def corrupted(air: Air, message: Message, tick: int, agents: Sequence[Agent | None]) -> None:
-        if isinstance(message, DroneState):
-            liar.hear(message)
-            if message.id == LIAR and tick > BEGIN:
-                message = liar.lie(message)
-        publish(air, message, tick, agents)
-
-    monkeypatch.setattr(Air, "publish", corrupted)
-    plan = Plan(scenarios=("rhombus",), faults=False, weather=False, overrides=(f"vehicles.all.body={body}",))
-    rng = np.random.default_rng(5)
-    for seed in range(CASES):
-        liar = Liar(seed)
-        case = draw_case(plan, rng)
-        flown = fly(case).position[:, : len(HONEST)]
-        low, high = fence_box(*prepare(case.scenario, case.overrides))
-        assert np.all((flown > low) & (flown < high))
-        for one, other in combinations(range(len(HONEST)), 2):
-            both = np.minimum(flown[:, one, 2], flown[:, other, 2]) > FLYING
-            assert np.all(np.hypot(*(flown[both, one, :2] - flown[both, other, :2]).T) >= 0.20)
+    honest, lying = fly(None, liar, law), fly(LIES[lie], liar, law)
+    for tick, (there, here) in enumerate(zip(honest, lying, strict=True)):
+        for one, other in zip(there, here, strict=True):
+            assert math.dist(one.position, other.position) < 0.12, (tick, one.id)
+            # The liar is told that nobody hears it; what it does about that is its own affair.
+            assert other.mode is Mode.FOLLOW or other.id == liar, (tick, other.id)
+    during, after = lying[END - 1], lying[LENGTH - 1]
+    others = [state for state in during if state.id != liar]
+    assert all(Flag.REJECTED_INPUT in state.flags for state in others)
+    assert not any((Flag.REJECTED_INPUT | Flag.REPAIRED) & state.flags for state in after)
