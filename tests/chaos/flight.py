@@ -97,11 +97,13 @@ class ChaosFlight(Swarm):
         keys = self._protocol == "quic"
         if keys:
             self._issue_keys(raw.swarm.name, nodes)
+        # Clients of a router dial nobody else.
+        met = [] if self._routed else nodes
         net = Net(
             profile=self._profile,
             interface="mesh" if self._profile == "radio" else "lo",
             keys=str(self._keyring.folder) if keys else "",
-            endpoints={node: self._endpoint(self.lab.mesh(node)) for node in nodes},
+            endpoints={node: self._endpoint(self.lab.mesh(node)) for node in met},
             router=self._endpoint(self.lab.mesh(ROUTER)) if self._routed else None,
         )
         vehicle = attrs.evolve(raw.vehicles.all, uri=f"sim://{self.lab.air('world')}:{WORLD_PORT}/{{id}}")
@@ -121,9 +123,10 @@ class ChaosFlight(Swarm):
     def command(self, row: ProcessRow) -> tuple[str, ...]:
         """See `Swarm.command`: in its namespace, where it listens on the mesh and in the air."""
         node = row.token if row.role == "drone" else row.role
-        known = node in self.scenario.net.endpoints
-        listen = ("--set", f"net.endpoints.{node}={self._endpoint(ANYWHERE)}") if known else ()
-        return (*self.lab.within(node if known or node == ROUTER else OBSERVER), *row.command, *listen)
+        placed = node == ROUTER or node in all_nodes(self.formation)
+        met = node in self.scenario.net.endpoints
+        listen = ("--set", f"net.endpoints.{node}={self._endpoint(ANYWHERE)}") if met else ()
+        return (*self.lab.within(node if placed else OBSERVER), *row.command, *listen)
 
     def add(self, role: str, module: str, *arguments: str) -> str:
         """Adds a process to the swarm; returns its token."""
