@@ -7,6 +7,6 @@ RUN apt-get update && apt-get install --yes --no-install-recommends systemd dbus
 COPY --from=ours /opt/swarmtouch /opt/swarmtouch
 COPY systemd /etc/systemd/system
 COPY systemd/swarmtouch.env /etc/swarmtouch/swarmtouch.env
-RUN echo "a token of this test" > /etc/swarmtouch/console-token && chmod 600 /etc/swarmtouch/console-token
+RUN echo 'SWARMTOUCH_CONSOLE_TOKEN="a token of this test"' > /etc/swarmtouch/console.env && chmod 600 /etc/swarmtouch/console.env
 COPY scenarios/rhombus.toml /etc/swarmtouch/scenario.toml
 CMD ["/lib/systemd/systemd"]

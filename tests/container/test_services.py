@@ -105,8 +105,9 @@ def soon(condition: Callable[[], bool]) -> bool:
 @pytest.mark.usefixtures("machine")
 def test_services_start_confined_and_end_cleanly() -> None:
     for service in SERVICES:
-        inside("systemctl", "start", service)  # returns when the process has said that it is ready
-        assert shown(service, "ActiveState") == "active"
+        inside("systemctl", "start", service, check=False)  # returns when the process has said that it is ready
+        said = inside("journalctl", "--no-pager", f"--unit={service}")
+        assert shown(service, "ActiveState") == "active", said
         status = inside("cat", f"/proc/{shown(service, 'MainPID')}/status")
         fields = dict(line.split(":\t") for line in status.splitlines() if ":\t" in line)
         assert fields["Uid"].split()[0] != "0"
