@@ -101,8 +101,12 @@ def test_ctrl_c_is_no_traceback() -> None:
 
 
 CTRL_C = f"""
-import signal, sys, deploy.cli, deploy.lockstep.simulate as simulate
-simulate.relayed = lambda *_: signal.raise_signal({signal.SIGINT.value})
+import signal, sys, time, deploy.cli, deploy.lockstep.simulate as simulate
+def interrupted(*_):
+    signal.raise_signal({signal.SIGINT.value})
+    while True:  # Python may take a moment to see it.
+        time.sleep(0.01)
+simulate.relayed = interrupted
 sys.exit(deploy.cli.main())
 """
 
