@@ -6,8 +6,8 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-_INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-"""Each would by default end the launcher, and with it everybody in the air."""
+_INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT)
+"""Each would by default end the launcher, as SIGHUP would, and with it everybody in the air."""
 _TERMINAL_USE = (signal.SIGTTOU, signal.SIGTTIN)
 
 
@@ -36,11 +36,22 @@ def watch_signals(on_interrupt: Callable[[], None], on_stop: Callable[[], None])
     that was started with `nohup`.
 
     Args:
-        on_interrupt: Called in the running event loop: the process is asked to end.
+        on_interrupt: Called in the running event loop: the process is asked to end. A hang-up asks only once.
         on_stop: Called there, too: it is asked to stop (Ctrl-Z).
     """
-    loop = asyncio.get_running_loop()
-    handlers = dict.fromkeys(_INTERRUPTS, on_interrupt)
+    loop, is_asked = asyncio.get_running_loop(), False
+
+    def interrupt() -> None:
+        nonlocal is_asked
+        is_asked = True
+        on_interrupt()
+
+    def hang_up() -> None:
+        # Terminal and shell both tell of a closed window: it hurries nothing that is ending already.
+        if not is_asked:
+            interrupt()
+
+    handlers = {**dict.fromkeys(_INTERRUPTS, interrupt), signal.SIGHUP: hang_up}
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         del handlers[signal.SIGHUP]
     if signal.getsignal(signal.SIGTSTP) is not signal.SIG_IGN:
