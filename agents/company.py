@@ -163,7 +163,7 @@ def _seen(
     found = []
     for other in silent:
         sensed, word = known.get(other), told.get(other)
-        seen = _told(other, reports) if sensed is None else _own(sensed, now_ns)
+        seen = _told(other, reports) if sensed is None else seen_of(sensed, sensed.age(now_ns))
         if word is not None and (seen is None or _order(word) > _order(seen)):
             seen = word
         if seen is not None:
@@ -175,11 +175,15 @@ def _order(seen: Seen) -> tuple[int, int]:
     return (seen.epoch, seen.seq)
 
 
-def _own(sensed: Sensed[DroneState], now_ns: int) -> Seen:
+def seen_of(sensed: Sensed[DroneState], age: float) -> Seen:
+    """Returns as what one that was heard was seen.
+
+    Args:
+        sensed: What it said.
+        age: How long ago that was, s.
+    """
     state = sensed.message
-    return Seen(
-        state.id, state.epoch, state.seq, state.position, state.velocity, state.mode, sensed.age(now_ns)
-    )
+    return Seen(state.id, state.epoch, state.seq, state.position, state.velocity, state.mode, age)
 
 
 def _told(other: int, reports: list[DroneState]) -> Seen | None:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Final, NamedTuple, final
 
-from agents.company import Memory, may_fly
+from agents.company import Memory, may_fly, seen_of
 from shared.clock import NS_PER_S
 from shared.messages import MOST_SEEN, DroneState, Places, Seen
 from shared.nodes import NEAR
@@ -116,7 +116,7 @@ def newest(drones: Collection[int], heard: Heard, told: Told, now_ns: int) -> di
     found = {drone: _newest_told(each) for drone, each in _told_of(drones, told).items()}
     for drone in drones:
         if (sensed := heard.get(drone)) is not None:
-            own, word = _sighting_of(sensed), found.get(drone)
+            own, word = Sighting(seen_of(sensed, 0.0), sensed.arrival_ns), found.get(drone)
             if word is None or sensed.age(now_ns) <= DRONE_STATE.stale_s or _order(own) > _order(word):
                 found[drone] = own
     return found
@@ -135,12 +135,6 @@ def _told_of(drones: Collection[int], told: Told) -> dict[int, list[Sighting]]:
                 at_ns = sensed.arrival_ns - round(seen.age * NS_PER_S)
                 sightings.setdefault(seen.id, []).append(Sighting(seen, at_ns))
     return sightings
-
-
-def _sighting_of(sensed: Sensed[DroneState]) -> Sighting:
-    state = sensed.message
-    seen = Seen(state.id, state.epoch, state.seq, state.position, state.velocity, state.mode, 0.0)
-    return Sighting(seen, sensed.arrival_ns)
 
 
 def _order(sighting: Sighting) -> tuple[int, int, int]:

@@ -1,4 +1,4 @@
-"""A formation as arrays, for whoever looks at flights as a whole; whoever flies needs none of it."""
+"""Formations and flights as arrays, for whoever looks at them as a whole; whoever flies needs none of it."""
 
 import numpy as np
 import numpy.typing as npt
@@ -6,6 +6,7 @@ import numpy.typing as npt
 from shared.formation import Formation
 
 Vec = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 def rest_of(formation: Formation) -> Vec:
@@ -25,3 +26,9 @@ def weights_of(formation: Formation) -> Vec:
         for column, weight in weights.items():
             matrix[row, column] = weight
     return matrix
+
+
+def stretches(mask: Mask) -> list[slice]:
+    """Returns the stretches of a mask (T,) that are true throughout, in order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [slice(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]

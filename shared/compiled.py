@@ -113,11 +113,8 @@ def hash_of(content: bytes) -> str:
 def hash_of_file(file: Path) -> str:
     """Returns the hash of a file's content."""
     # Without Python's buffers: a start looks at some eighty files.
-    opened = os.open(file, os.O_RDONLY)
-    try:
-        return hash_of(os.read(opened, os.fstat(opened).st_size + 1))
-    finally:
-        os.close(opened)
+    with open(file, "rb", buffering=0) as opened:
+        return hash_of(opened.read())
 
 
 def manifest_file(folder: Path) -> Path:

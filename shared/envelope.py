@@ -121,8 +121,13 @@ def envelope_of(scenario: Scenario, drone: int) -> Envelope:
     Raises:
         ConfigError: There is no such file, or something is wrong with it.
     """
+    return load_envelope(envelope_name(scenario, drone))
+
+
+def envelope_name(scenario: Scenario, drone: int) -> str:
+    """Returns what names the envelope of one drone's vehicle, see `load_envelope`."""
     settings = vehicle_settings(scenario, drone)
-    return load_envelope(settings.envelope or str(settings.body))
+    return settings.envelope or str(settings.body)
 
 
 @functools.cache

@@ -23,7 +23,7 @@ BODY_SPEED, FALL_SPEED = 5.0, 10.0
 """A small drone that is blown away or falls indoors is no faster, m/s."""
 MARGIN = 4.0
 """Nor is one that follows: it overshoots, and goes faster where it has to catch up or to escape."""
-LONGEST_LOOK = 0.25
+LONGEST_LOOK: Final = 0.25
 """A pose is no older than this when one looks ahead from it, s."""
 AHEAD_SLACK, PACE_SLACK, ASKED_SLACK = 0.1, 0.1, 0.01
 """How far a point ahead, its pace and its acceleration may be off what a vehicle can do, m, m/s, m/s^2."""

@@ -33,6 +33,11 @@ def shorten(vector: Vector, largest: float) -> Vector:
     return (x * share, y * share, z * share)
 
 
+def clip(value: float, low: float, high: float) -> float:
+    """Returns the nearest number from `low` to `high`."""
+    return low if value < low else high if value > high else value
+
+
 def clamp(vector: Vector, low: Vector, high: Vector) -> Vector:
     """Returns the nearest point of the box from `low` to `high`."""
     x, y, z = vector

@@ -12,8 +12,7 @@ import numpy as np
 from attrs import frozen
 
 from agents.vehicles.world.referee import Rules
-from deploy.falsify.swarm import Mask
-from shared.arrays import Vec
+from shared.arrays import Mask, Vec, stretches
 from shared.envelope import REACTION, AxisEnvelope
 
 SETS_OUT = 0.05
@@ -51,18 +50,14 @@ def beyond_help(chase: Chase, near: Mask, keep: float) -> Mask:
         keep: That distance, m.
     """
     found = np.zeros_like(near)
-    for first, last in _runs(near):
+    for ticks in stretches(near):
+        first: int = ticks.start
         start = _set_out(chase, first)
-        closest = first + int(np.argmin(_distance(chase, first, last))) + 1
+        apart = np.linalg.norm(chase.body[ticks] - chase.hand[ticks], axis=1)
+        closest = first + int(np.argmin(apart)) + 1
         if start < first and not _could_flee(chase, start, closest, keep):
-            found[first:last] = True
+            found[ticks] = True
     return found
-
-
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Returns first tick, and the one after the last, of every run of true ones."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _set_out(chase: Chase, tick: int) -> int:
@@ -73,16 +68,7 @@ def _set_out(chase: Chase, tick: int) -> int:
     gap = chase.body[:tick] - chase.hand[:tick]
     approach = (velocity * gap).sum(axis=1) / np.maximum(np.linalg.norm(gap, axis=1), 1e-9)
     calm = np.flatnonzero(approach <= SETS_OUT)
-    if not calm.size:
-        return 0
-    last = int(calm[-1]) + 1
-    return tick if last == tick else last
-
-
-def _distance(chase: Chase, first: int, last: int) -> Vec:
-    """Returns how far the body is from the hand at some ticks, m."""
-    found: Vec = np.linalg.norm(chase.body[first:last] - chase.hand[first:last], axis=1)
-    return found
+    return int(calm[-1]) + 1 if calm.size else 0
 
 
 def _could_flee(chase: Chase, start: int, end: int, keep: float) -> bool:

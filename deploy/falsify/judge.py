@@ -14,8 +14,8 @@ from attrs import frozen
 from agents.vehicles.bodies.state import AIRBORNE_HEIGHT
 from agents.vehicles.world.referee import Rules
 from deploy.falsify.escape import Chase, beyond_help
-from deploy.falsify.swarm import Flown, Mask
-from shared.arrays import Vec
+from deploy.falsify.swarm import Flown
+from shared.arrays import Mask, Vec
 from shared.cylinders import Cylinder
 
 Kind = Literal["drones", "hand", "column", "fence_x", "fence_y", "fence_z", "floor"]

@@ -18,7 +18,7 @@ from deploy.falsify.case import Case, FaultKind
 from deploy.falsify.hand import poses, samples, tracked
 from deploy.lockstep.start import EPOCH, introduce, rest_places, start_flyers
 from deploy.lockstep.ticks import tick_length, tick_ns
-from shared.arrays import Vec
+from shared.arrays import Mask, Vec
 from shared.clock import NS_PER_S
 from shared.envelope import AxisEnvelope, envelope_of
 from shared.formation import Formation
@@ -26,8 +26,6 @@ from shared.messages import DroneState, HandSample, Mode, Vector
 from shared.scenario import Scenario
 from shared.scenario_check.check import open_scenario
 from shared.vehicles import vehicle_settings
-
-Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 @frozen(kw_only=True, eq=False)

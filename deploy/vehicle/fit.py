@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from agents.control.safety.response import OBSERVED_WITHIN, Response, observe, start_axis, tell
+from agents.control.safety.response import Response, observe, observed_share, start_axis, tell
 from deploy.vehicle.motion import RATE_HZ
 from shared.arrays import Vec
 
@@ -132,7 +132,7 @@ def _left_over(response: Response, setpoint: Vec, position: Vec) -> Vec:
     """Returns what the observer is surprised by along a stretch, m/s^2, averaged over a tenth of a second."""
     velocity = np.gradient(_smooth(position), _DT)
     axis, surprises = start_axis(float(position[0]), float(velocity[0])), []
-    share = 1.0 - math.exp(-_DT / (OBSERVED_WITHIN + 2.0 * response.lag))
+    share = observed_share(_DT, response.lag)
     rows = zip(setpoint.tolist(), position[1:].tolist(), velocity[1:].tolist(), strict=False)
     for wanted, place, speed in rows:
         axis = tell(wanted, axis, _DT)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from attrs import field, frozen
 
+from shared.arrays import stretches
 from shared.clock import NS_PER_S
 from shared.formation import Formation
 from shared.recordings.check import gap_ns
@@ -136,6 +137,4 @@ def hold(t: Vec, at: Vec, values: Vec) -> Vec:
 
 def runs(values: Vec) -> list[slice]:
     """Returns the stretches of rows (T, k) without a gap, in order."""
-    there = ~np.isnan(values).any(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(np.int8)))
-    return [slice(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]
+    return stretches(np.array(~np.isnan(values).any(axis=1)))

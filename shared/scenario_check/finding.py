@@ -2,6 +2,9 @@
 
 from attrs import frozen
 
+ROUNDING = 1e-9
+"""What is too far by less than this fits, m."""
+
 
 @frozen
 class Finding:

@@ -9,7 +9,7 @@ from shared.envelope import BODY
 from shared.fence import fence_box, goal_box, hand_box, shape_box
 from shared.formation import Formation
 from shared.scenario import Pair, Scenario
-from shared.scenario_check.finding import Finding
+from shared.scenario_check.finding import ROUNDING, Finding
 
 LOWEST_FLIGHT = 0.2
 """Below this height a drone that takes off counts as having landed, m; one that follows is about to."""
@@ -19,7 +19,6 @@ START_ROOM = 0.05
 FASTEST_WALKER = 1.5
 """Drones evade a hand, or a person, of at most this speed, m/s."""
 
-_ROUNDING = 1e-9
 _AXES = "xyz"
 
 
@@ -38,7 +37,7 @@ def _formation_fits(scenario: Scenario, formation: Formation) -> Iterator[Findin
     lower, upper = shape_box(scenario, formation)
     for axis in range(2):
         there, needed = high[axis] - low[axis], upper[axis] - lower[axis]
-        if needed > there + _ROUNDING:
+        if needed > there + ROUNDING:
             turning = " at any heading" if scenario.hand.follow_yaw else ""
             yield Finding(
                 "fence",
@@ -86,7 +85,7 @@ def _heights_fit(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
     heights = [z for _, _, z in formation.rest]
     lowest, tallest = min(heights), max(heights)
     least = max(floor, 0.0) + LOWEST_FLIGHT
-    if hand is not None and not (hand + lowest >= least - _ROUNDING and hand + tallest <= highest):
+    if hand is not None and not (hand + lowest >= least - ROUNDING and hand + tallest <= highest):
         yield Finding(
             "hand.height",
             f"the formation flies from {hand + lowest:.2f} to {hand + tallest:.2f} m high, ground and fence"
@@ -102,7 +101,7 @@ def _clip_fits(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
     lower, upper = shape_box(scenario, formation)
     for axis in range(2):
         reach_low, reach_high = base_low[axis] + lower[axis], base_high[axis] + upper[axis]
-        if reach_low < low[axis] - _ROUNDING or reach_high > high[axis] + _ROUNDING:
+        if reach_low < low[axis] - ROUNDING or reach_high > high[axis] + ROUNDING:
             yield Finding(
                 "hand.clip",
                 f"it lets the formation reach from {reach_low:.2f} to {reach_high:.2f} m along"

@@ -4,14 +4,11 @@ import math
 from collections.abc import Iterator
 
 from shared.cells import near_pairs
-from shared.envelope import Envelope, envelope_of
+from shared.envelope import Envelope, envelope_name, envelope_of
 from shared.errors import ConfigError
 from shared.formation import Formation
 from shared.scenario import Scenario
-from shared.scenario_check.finding import Finding
-from shared.vehicles import vehicle_settings
-
-_ROUNDING = 1e-9
+from shared.scenario_check.finding import ROUNDING, Finding
 
 
 def check_vehicles(scenario: Scenario, formation: Formation) -> Iterator[Finding]:
@@ -26,13 +23,13 @@ def check_vehicles(scenario: Scenario, formation: Formation) -> Iterator[Finding
     points = [(x, y) for x, y, _ in formation.rest]
     lacks = [(_lack(formation, envelopes, one, other), one, other) for one, other in near_pairs(points, reach)]
     lack, one, other = max(lacks, default=(0.0, 0, 0))
-    if lack > _ROUNDING:
+    if lack > ROUNDING:
         first, second = formation.ids[one], formation.ids[other]
         needed = envelopes[first].clearance(envelopes[second])
         yield Finding(
             "formation",
             f"drones {first} and {second} rest {needed - lack:.3f} m apart, seen from above; their vehicles"
-            f" ({_named(scenario, first)}, {_named(scenario, second)}) keep {needed:.3f} m",
+            f" ({envelope_name(scenario, first)}, {envelope_name(scenario, second)}) keep {needed:.3f} m",
             f"move them {lack:.3f} m farther apart, or fly vehicles with a smaller envelope",
         )
 
@@ -44,8 +41,3 @@ def _lack(formation: Formation, envelopes: dict[int, Envelope], one: int, other:
     if abs(z - c) >= max(first.downwash.height, second.downwash.height):
         return 0.0
     return first.clearance(second) - math.hypot(x - a, y - b)
-
-
-def _named(scenario: Scenario, drone: int) -> str:
-    settings = vehicle_settings(scenario, drone)
-    return str(settings.envelope or settings.body)

@@ -132,15 +132,23 @@ def _demand(
 ) -> None:
     """Adds all that is demanded."""
     _keep_in(demands, ahead, pace, settings, floor=floor)
-    for column in settings.columns:
-        if _reaches(column, ahead, pace, settings):
-            _keep_off(demands, column, ahead, pace, settings, STATIC)
-    for walker in walkers:
-        if _reaches(walker, ahead, pace, settings):
-            _keep_off(demands, walker, ahead, pace, settings, YIELDING if walker.yields else UNYIELDING)
-    for drone in drones:
-        if _reaches(drone, ahead, pace, settings):
-            _keep_off(demands, drone, ahead, pace, settings, YIELDING if drone.yields else UNYIELDING)
+    _keep_off_all(demands, settings.columns, ahead, pace, settings, STATIC)
+    _keep_off_all(demands, walkers, ahead, pace, settings, UNYIELDING)
+    _keep_off_all(demands, drones, ahead, pace, settings, UNYIELDING)
+
+
+def _keep_off_all(
+    demands: Demands,
+    encounters: list[Encounter],
+    ahead: Vector,
+    pace: Vector,
+    settings: SafetySettings,
+    rank: int,
+) -> None:
+    """Adds what encounters demand; those that do not yield are of a rank."""
+    for encounter in encounters:
+        if _reaches(encounter, ahead, pace, settings):
+            _keep_off(demands, encounter, ahead, pace, settings, YIELDING if encounter.yields else rank)
 
 
 def _keep_in(demands: Demands, ahead: Vector, pace: Vector, settings: SafetySettings, *, floor: bool) -> None:

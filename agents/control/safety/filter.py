@@ -16,7 +16,7 @@ from agents.control.safety.encounter import Encounter
 from agents.control.safety.halfplanes import nearest
 from agents.control.safety.motion import Motion, point_ahead
 from agents.control.safety.response import asked_by, setpoint_for, tell
-from agents.control.vectors import Planar, Vector
+from agents.control.vectors import Planar, Vector, clip
 
 
 @mypyc_attr(acyclic=True, free_list_len=1)
@@ -105,19 +105,19 @@ def guard(
         wanted = _wanted(wish, pace, demands, dt)
         safe, kept = nearest(wanted, demands.ranks, horizontal.acceleration)
         a, b = safe
-        x = _clip(setpoint_for(a, motion.x, dt, horizontal), settings.lowest[0], settings.highest[0])
-        y = _clip(setpoint_for(b, motion.y, dt, horizontal), settings.lowest[1], settings.highest[1])
+        x = clip(setpoint_for(a, motion.x, dt, horizontal), settings.lowest[0], settings.highest[0])
+        y = clip(setpoint_for(b, motion.y, dt, horizontal), settings.lowest[1], settings.highest[1])
     c = asked_by(z, motion.z, dt, vertical)
     upright = not demands.least <= c <= demands.most
     if upright:
-        c = _clip((wish.velocity[2] - pace[2]) / dt, -wish.acceleration, wish.acceleration)
+        c = clip((wish.velocity[2] - pace[2]) / dt, -wish.acceleration, wish.acceleration)
         kept = kept and demands.least <= demands.most
         # The ceiling and who flies below have the last word: who climbs out of the way can still fall.
         c = min(max(c, demands.least), demands.most)
-        z = _clip(setpoint_for(c, motion.z, dt, vertical), settings.lowest[2], settings.highest[2])
+        z = clip(setpoint_for(c, motion.z, dt, vertical), settings.lowest[2], settings.highest[2])
     told = Motion(tell(x, motion.x, dt), tell(y, motion.y, dt), tell(z, motion.z, dt), motion.age)
     # Of what is demanded beyond what the vehicle can do nobody should be told.
-    c = _clip(c, -vertical.acceleration, vertical.acceleration)
+    c = clip(c, -vertical.acceleration, vertical.acceleration)
     return Guarded((x, y, z), told, ahead, pace, (a, b, c), planar=planar, upright=upright, kept=kept)
 
 
@@ -128,7 +128,3 @@ def _wanted(wish: Wish, pace: Vector, demands: Demands, dt: float) -> Planar:
     if size > wish.acceleration:
         a, b = a * (wish.acceleration / size), b * (wish.acceleration / size)
     return (a + demands.aside_x, b + demands.aside_y)
-
-
-def _clip(value: float, low: float, high: float) -> float:
-    return low if value < low else high if value > high else value

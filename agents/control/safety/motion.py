@@ -4,8 +4,9 @@ from typing import Final, final
 
 from mypy_extensions import mypyc_attr
 
-from agents.control.safety.response import LONGEST_LOOK, Axis, Response, observe, start_axis
+from agents.control.safety.response import Axis, Response, observe, start_axis
 from agents.control.vectors import Vector
+from shared.plausibility import LONGEST_LOOK
 
 
 @mypyc_attr(acyclic=True)

@@ -20,14 +20,15 @@ from typing import Final, final
 
 from mypy_extensions import mypyc_attr
 
+from shared.plausibility import LONGEST_LOOK
+
 OBSERVED_WITHIN: Final = 0.12
 """Time constant with which `rest` is observed, s; twice the lag is added to it."""
 LARGEST_REST: Final = 0.6
 """Bound of `rest` as a multiple of the acceleration: no model holds for a body that is held, or stands."""
 SHORTEST_LOOK: Final = 2e-3
-"""Two poses that are closer in time than this say nothing about accelerations, s ..."""
-LONGEST_LOOK: Final = 0.25
-"""... and nothing about the present one those that are farther apart, s."""
+"""Two poses that are closer in time than this say nothing about accelerations, s, and nothing about the present
+one those that are farther apart than `LONGEST_LOOK`."""
 
 
 @final
@@ -114,12 +115,17 @@ def observe(axis: Axis, position: float, velocity: float, dt: float, response: R
         actual = asked + (axis.actual - asked) * decay
         mean = asked + (axis.actual - asked) * (1.0 - decay) * response.lag / dt
     surprise = (velocity - axis.velocity) / dt - mean
-    share = 1.0 - math.exp(-dt / (OBSERVED_WITHIN + 2.0 * response.lag))
+    share = observed_share(dt, response.lag)
     bound = LARGEST_REST * response.acceleration
     # Who does all it can tells nothing more: what was thought of a body that was held does not outlast that.
     known = axis.rest if abs(asked) < response.acceleration else axis.rest * (1.0 - share)
     rest = min(max(known + share * surprise, -bound), bound)
     return Axis(position, velocity, actual, rest, axis.setpoint, axis.rate)
+
+
+def observed_share(dt: float, lag: float) -> float:
+    """Returns the share of a surprise that `rest` takes in within a time, s."""
+    return 1.0 - math.exp(-dt / (OBSERVED_WITHIN + 2.0 * lag))
 
 
 def asked_by(setpoint: float, axis: Axis, dt: float, response: Response) -> float:

@@ -6,9 +6,9 @@ Per horizontal axis `a = 15.64 e - 8.65 v + 2.75 int(e)`; the vertical axis is t
 import math
 from typing import Final, final
 
-from agents.control.vectors import Vector
+from agents.control.vectors import Vector, clip
 from agents.vehicles.bodies.airframe import DRAG, MOTOR_LAG, move, thrust_of
-from agents.vehicles.bodies.pid import LIFT, PERIOD, ROUNDING, clip, open_loop
+from agents.vehicles.bodies.pid import LIFT, PERIOD, ROUNDING, open_loop
 from agents.vehicles.bodies.state import FLY, Body, Model
 
 STIFFNESS: Final = 15.64

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, final
 
-from agents.control.vectors import ORIGIN, Vector
+from agents.control.vectors import ORIGIN, Vector, clip
 from agents.vehicles.bodies.airframe import HOVER_PWM, thrust_of
 from agents.vehicles.bodies.state import CUT, DESCEND, IDLE, Body
 
@@ -82,11 +82,6 @@ TILT: Final = Pid(40.0, 20.0, 2.0, limit=0.1, low=-10.0, high=10.0, grounded=0.0
 LIFT: Final = Pid(
     5000.0, 6000.0, _LIFT_GAIN, limit=1000.0, low=10_000.0, high=60_000.0, grounded=0.99 * _HOVER_INTEGRAL
 )
-
-
-def clip(value: float, low: float, high: float) -> float:
-    """Returns the nearest number from `low` to `high`."""
-    return low if value < low else high if value > high else value
 
 
 def open_loop(kind: int, pwm: float, *, grounded: bool) -> float:
